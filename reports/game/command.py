@@ -69,7 +69,6 @@ def own_rows(names: Sequence[str]) -> tuple[dict[str, EngineRow], float]:
 
 
 def read_flight(path: Path) -> Scenario:
-    """The scenario in a scene file; exits 2 with a line for each fault."""
     if path.suffix.lower() in KINDS:
         flag = f"--engine {shlex.quote(str(path))}"
         refuse([f"{path}: is a solver, not a flight; fly it with {flag}"])

@@ -36,7 +36,6 @@ class FirstCollision(NamedTuple):
 
     @property
     def disks(self) -> set[int]:
-        """Without a wall."""
         return {disk for disk in (self.i, self.j) if disk >= 0}
 
 

@@ -85,8 +85,6 @@ class Pilot:
     past: list[Thrust] = field(default_factory=list)
 
     def key(self, key: str, down: bool, frame: int, angle: float) -> None:
-        """Key `key` of `KEYS` goes down (again) or up at the start of frame `frame`, the ship's
-        heading `angle` rad."""
         kind, now, force, torque = "torque", frame * self.interval, np.zeros(2), 0.0
         if key in FORWARD:
             kind, size = "force", down * FORWARD[key] * THRUST * float(self.scene.mass[SHIP])
@@ -141,7 +139,6 @@ class Flyer:
     divergence: Divergence | None = None
 
     def leave(self, reason: Exception | str, at: float) -> None:
-        """Fly no more, from `at` s of the flight on."""
         if isinstance(reason, Exception):
             reason = on_the_clock(reason, self.touches.since)
         self.left, self.left_at = reason, at
@@ -222,7 +219,6 @@ class Flight:
 
     @property
     def over(self) -> bool:
-        """Whether there is nothing left to fly."""
         return self.frame >= self.scenario.intervals or all(flyer.left for flyer in self.flyers)
 
     @property
@@ -235,7 +231,6 @@ class Flight:
         return self.is_game and near and float(ship.angular_velocity[SHIP]) < SLOW_SPIN
 
     def key(self, key: str, down: bool) -> None:
-        """A key event, which acts from the next frame on; a replay has its own."""
         if not self.replayed:
             self.pilot.key(key, down, self.frame, float(self.solid.state.angle[SHIP]))
             self.steered = replace(self.scenario, thrusts=list(self.pilot.held.values()))
@@ -306,7 +301,6 @@ class Flight:
             self.set_back(flyer, before, (step + count) * self.dt)
 
     def set_back(self, flyer: Flyer, before: State, now: float) -> None:
-        """The ship to its start, all else as it is, at `now` s; it was last seen in `before`."""
         scene = self.scenario.scene
         arrays: dict[str, Any] = {
             name: np.array(array) for name, array in vars(flyer.state).items()
@@ -378,7 +372,6 @@ class Flight:
         return replace(self.scenario, duration=duration, thrusts=self.pilot.thrusts(frames))
 
     def close(self) -> None:
-        """Give every engine back."""
         self.threads.shutdown(wait=False)
         for flyer in self.flyers:
             if flyer.engine is not None:

@@ -153,5 +153,4 @@ async def converse(socket: WebSocket, session: Session) -> None:
 
 
 def routes(game: Game) -> list[BaseRoute]:
-    """The game at /."""
     return [Route("/", game.page), WebSocketRoute("/fly", game.fly)]

@@ -30,7 +30,6 @@ MOST_ENGINES = 16  # in a flight
 
 
 def known(name: str) -> str:
-    """A name that is a row of `ENGINES` by now."""
     if name not in ENGINES:
         raise ValueError(f"{name!r} is no engine")
     return name
@@ -54,23 +53,17 @@ class Fly(_Message):
 
 
 class Frames(_Message):
-    """Fly on by so many frames, and tell where everything is."""
-
     do: Literal["frames"]
     count: int = Field(ge=1, le=MOST_FRAMES)
 
 
 class Key(_Message):
-    """A key went down (again) or up."""
-
     do: Literal["key"]
     key: Literal[KEYS]  # type: ignore[valid-type]
     down: bool
 
 
 class Save(_Message):
-    """Give the flight as a scene file."""
-
     do: Literal["save"]
 
 
@@ -111,7 +104,6 @@ class Session:
         self.flight = self.begin(Fly(do="fly", engines=list(engines), restitution=restitution))
 
     def begin(self, wish: Fly) -> Flight:
-        """A new flight as wished; a file's own field and step are kept."""
         if self.file is not None:
             return Flight(self.file, wish.engines, replayed=True)
         scenario = field_scenario(wish.seed, wish.asteroids, wish.restitution, wish.substeps)
@@ -142,7 +134,6 @@ class Session:
         }
 
     def field(self) -> dict[str, Any]:
-        """What stays as it is during a flight, and its first frame."""
         flight = self.flight
         scene = flight.scenario.scene
         return {
@@ -158,7 +149,6 @@ class Session:
         }
 
     def now(self) -> dict[str, Any]:
-        """Where everything is at the end of the last frame."""
         flight, interval = self.flight, self.flight.scenario.sample_interval
         solid, ship = flight.solid, flight.solid.state
         last = solid.edges[-1] if solid.edges else None

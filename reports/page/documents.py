@@ -71,7 +71,6 @@ def fragment(template: str, **fields: Any) -> str:
 
 @cache
 def environment() -> Environment:
-    """Text is escaped, and an undefined name is an error."""
     templates = Environment(
         loader=FileSystemLoader(REPORTS),
         autoescape=True,
@@ -84,7 +83,6 @@ def environment() -> Environment:
 
 
 def for_script(value: Any) -> Markup:
-    """`value` as JSON that may stand in a script block."""
     return Markup(json.dumps(value).replace("<", "\\u003c"))
 
 

@@ -124,7 +124,6 @@ def draw_line(axes: Axes, line: Line) -> None:
 
 
 def marker(look: style.Look) -> Any:
-    """The shape of a look as a marker of matplotlib."""
     from matplotlib.path import Path
 
     if look.shape == "circle":
@@ -142,7 +141,6 @@ def marker(look: style.Look) -> Any:
 
 
 def format_time(value: float) -> str:
-    """A value in µs as µs, ms or s."""
     units = ((1e6, "s"), (1e3, "ms"), (1.0, "µs"))
     size, unit = next((unit for unit in units if value >= 0.9 * unit[0]), units[-1])
     return f"{style.number(value / size, 2)} {unit}"
@@ -213,7 +211,6 @@ def label_lines(axes: Axes, lines: Sequence[Line]) -> None:
 
 
 def dense(points: Any) -> Any:
-    """Points along a line through these, in pixels."""
     steps = np.linspace(0, 1, 12)[:, None]
     return np.vstack([points, *(start + steps * (end - start) for start, end in pairwise(points))])
 

@@ -80,8 +80,6 @@ SCENES = {
 
 
 def findings(summary: Summary) -> list[str]:
-    """The reader's own solvers, the nearest engines, the laws that are broken, the ends of exact
-    answers, the refusals."""
     comparisons = [scene.comparison for scene in summary.scenes]
     own = [name for name in summary.names if name.endswith(OWN) and name not in summary.untrusted]
     broken = laws_broken(summary)
@@ -136,7 +134,6 @@ def nearest(summary: Summary) -> str:
 
 
 def own_sentence(name: str, summary: Summary) -> str:
-    """How near the reader's own solver is, where it is lost, and what it was not asked."""
     errors = {s.name: s.error(name) for s in summary.scenes if s.counts}
     errors = {scene: error for scene, error in errors.items() if not np.isnan(error)}
     lost = sorted((s for s in errors if errors[s] > LOST), key=lambda s: -errors[s])
@@ -183,11 +180,10 @@ def early_ends(comparisons: Sequence[Comparison]) -> list[str]:
 
 
 def refusals(comparisons: Sequence[Comparison]) -> list[str]:
-    """A sentence for each reason for which cells were refused. That an engine does not model
-    friction stands in the summary of the scenes with friction."""
     by_reason: dict[str, list[str]] = {}
     for comparison in comparisons:
         for run in comparison.runs:
+            # missing friction stands in the summary of the scenes with friction
             if run.status == "unsupported" and not run.frictionless:
                 by_reason.setdefault(run.reason, []).append(run.name.removesuffix(OWN))
     return [
@@ -197,8 +193,6 @@ def refusals(comparisons: Sequence[Comparison]) -> list[str]:
 
 
 def not_counted(broken: Mapping[str, Finding]) -> list[str]:
-    """A sentence for each engine that broke the protocol; `broken`: name -> the probe that
-    failed."""
     sentences = []
     for name, row in sorted(broken.items()):
         if row["got"] == "raised":
@@ -218,8 +212,6 @@ def is_lawless(findings: Sequence[Finding]) -> bool:
 
 
 def own_engine_sentences(findings: Sequence[Finding]) -> list[str]:
-    """A sentence on a reader's own engine, which begins with its departures; none if it keeps all
-    probes."""
     if not findings or f":{findings[0]['profile']}" != OWN:
         return []
     missed = {row["probe"]: row for row in findings if row["verdict"] in ("departs", "breaks")}
@@ -255,6 +247,5 @@ def is_visible(row: Finding) -> bool:
 
 
 def fill_in(text: str, row: Finding) -> str:
-    """The text with the two numbers of a row."""
     got = row["got"] if isinstance(row["got"], str) else round(row["got"], 9)  # 0 for 4e-15
     return text.format(got=number(got, 2), expected=number(row["expected"], 2))

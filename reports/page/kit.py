@@ -101,15 +101,12 @@ class Table:
         return rows
 
     def packed(self, label: str) -> str:
-        """The parts below a row, as HTML, deflated."""
         macros: Any = environment().get_template("page/kit_parts.html.j2").module
         return deflated(str(macros.parts(self.opens[label])))
 
 
 @dataclass(frozen=True, eq=False)
 class Chart:
-    """A picture of `drawing.svg_of`, with its title and a sentence."""
-
     svg: str
     title: str = ""
     caption: str = ""
@@ -150,8 +147,6 @@ class Text:
 
 @dataclass(frozen=True, eq=False)
 class Code:
-    """Lines to copy, with a button that does."""
-
     source: str
     kind: ClassVar[str] = "code"
 
@@ -215,7 +210,6 @@ def render_page(page: Page) -> str:
 
 
 def run_section(about: Mapping[str, Any]) -> Section:
-    """The command, the machine and the versions of a run, folded."""
     facts = {
         "Command": about.get("command", ""),
         "Seed": about.get("seed", ""),

@@ -12,7 +12,6 @@ Said = tuple[str, Sequence[str]]
 
 
 def sourced(sentence: str, lines: Sequence[str]) -> Markup:
-    """A sentence, and below it its lines, as `Said` has them."""
     small = Markup("<br><small>{} <code>{}</code></small>")
     return Markup("").join([sentence, *(small.format(*line.split(": ", 1)) for line in lines)])
 

@@ -132,7 +132,6 @@ def ratio_of(scenario: Scenario, layers: Layers) -> float:
 def pack_layer(
     run: Run | None, trajectory: Trajectory, samples: NDArray[np.int64], scenario: Scenario
 ) -> tuple[dict[str, Any], bytes]:
-    """The head and the numbers of one layer, which ends with its trajectory."""
     first = round(trajectory.t[0] / scenario.sample_interval)
     rows = samples[samples < first + len(trajectory)] - first
     position = trajectory.position[rows].reshape(len(rows), -1, 2)

@@ -144,7 +144,6 @@ def make_report(results: RunResults, say: Callable[[str], None]) -> Report:
 
 
 def take_times(folder: Path) -> str:
-    """The command that takes the times of a run."""
     return shlex.join(["crosscheck", "report", str(folder), "--timings", f"{TIMINGS:g}"])
 
 
@@ -250,7 +249,6 @@ def one_scene(summary: Summary) -> list[Section]:
 
 
 def settings_section(summary: Summary) -> Section | None:
-    """What "matched" means for each library: code to copy, and the settings that differ."""
     if not summary.chosen:
         return None
     scene = next((s for s in summary.scenes if s.name == "oblique_e09"), summary.scenes[0])
@@ -290,7 +288,6 @@ def settings_section(summary: Summary) -> Section | None:
 
 
 def conformance_section(conformance: pd.DataFrame) -> Section | None:
-    """The probes that an engine answers otherwise than stated."""
     if conformance.empty:
         return None
     answers: dict[tuple[str, str], list[str]] = {}
@@ -311,7 +308,6 @@ def conformance_section(conformance: pd.DataFrame) -> Section | None:
 
 
 def trust_section(summary: Summary, known_answers: Sequence[Mapping[str, Any]]) -> Section:
-    """What is proven, what is measured, and what a median hides."""
     paragraphs = [
         "<b>Proven</b>: the exact answers, to 1e-9 of the smallest radius. They share no code with"
         " any engine, and are used up to the horizon: the time after which rounding alone would"

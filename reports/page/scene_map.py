@@ -42,7 +42,6 @@ SPECIAL = ("reference:exercise", "reference:lesson", "reference:ordered", "event
 
 
 def map_section(summary: Summary) -> Section:
-    """A row for each scene, in groups by situation; a mark for each engine, in groups, too."""
     groups = [(label(names[0]), names) for names in summary.profiles.values()]
     own = [name for name in summary.names if name.endswith(OWN)]
     ours = [name for name in SPECIAL if name in summary.names]
@@ -93,7 +92,6 @@ def title_of(scene: SceneScores) -> str:
 
 
 def mark(scene: SceneScores, name: str, first: str) -> TableCell:
-    """A cell of the map: a sign by the size of the error, which words explain."""
     name = stand_in(name, scene)
     error = scene.error(name)
     if name in scene.refused or np.isnan(error):
@@ -109,7 +107,6 @@ def mark(scene: SceneScores, name: str, first: str) -> TableCell:
 
 
 def replays(scene: SceneScores, summary: Summary) -> list[Part]:
-    """The replays side by side, three engines ticked."""
     scenario = scene.comparison.scenario
     layers = replay.played(scene.comparison)
     names = [run.name for run, _ in layers if run is not None]
@@ -162,8 +159,6 @@ def to_tick(
 
 
 def remarks(scene: SceneScores) -> list[Part]:
-    """Where the scene comes from, why it has no exact answer, who refused it, and what a step of
-    it may miss."""
     scenario, truth = scene.comparison.scenario, scene.comparison.truth
     sentences = [f"Source: {scenario.source}."] if scenario.source and truth is not None else []
     if truth is None:

@@ -106,7 +106,6 @@ class SceneScores:
 
     @cached_property
     def statuses(self) -> dict[tuple[str, float], str]:
-        """(engine, dt in s) -> how the run ended."""
         return {(run.name, run.dt): run.status for run in self.comparison.runs}
 
     @cached_property
@@ -116,7 +115,6 @@ class SceneScores:
 
     @cached_property
     def frictionless(self) -> set[str]:
-        """The engines that refuse the scene because they model no friction."""
         return {run.name for run in self.comparison.middle_runs if run.frictionless}
 
     @cached_property
@@ -138,7 +136,6 @@ class SceneScores:
         return self.errors.get((name, dt, metric), np.inf) if self.counts else np.nan
 
     def raw_error(self, name: str) -> float:
-        """The position error at the middle step size, whatever verdict the run fails."""
         key = (name, self.comparison.middle_dt, ERROR)
         return self.errors.get(key, np.nan) if self.counts else np.nan
 
@@ -146,7 +143,7 @@ class SceneScores:
         return self.statuses.get((name, self.comparison.middle_dt)) == "unsupported"
 
     def is_lost(self, name: str) -> bool:
-        """Whether an engine fails, or is more than a radius off; a refusal is neither."""
+        # a refusal is no loss
         return self.error(name) > LOST and not self.refuses(name)
 
     def verdicts(self, name: str) -> list[tuple[str, float]]:
@@ -154,7 +151,6 @@ class SceneScores:
         return self.failed.get((name, self.comparison.middle_dt), [])
 
     def words(self, name: str) -> list[str]:
-        """The same in words, or why it was not played; then whether it is a radius off."""
         if name in self.refused:
             return [self.refused[name]]
         words = [in_words(verdict, value) for verdict, value in self.verdicts(name)]
@@ -165,7 +161,7 @@ class SceneScores:
 
     @cached_property
     def follows(self) -> dict[str, float]:
-        """Engine -> s, when a disk is first a radius off; inf if none is."""
+        # engine -> s, when a disk is first a radius off; inf if none is
         truth, scene = self.comparison.truth, self.comparison.scenario.scene
         times = {}
         for run in self.comparison.middle_runs:
@@ -184,7 +180,6 @@ class SceneScores:
 
 
 def values_by(rows: pd.DataFrame) -> dict[tuple[str, float, str], float]:
-    """(`engine:profile`, dt in s, metric) -> the value of each row."""
     names = rows.engine + ":" + rows.profile
     return dict(zip(zip(names, rows.dt_s.astype(float), rows.metric), rows.value.astype(float)))
 
@@ -194,7 +189,6 @@ def scenes_of(comparisons: Iterable[Comparison]) -> list[SceneScores]:
 
 
 def smooth(scenes: Sequence[SceneScores]) -> list[SceneScores]:
-    """Those without friction that are scored."""
     return [scene for scene in scenes if scene.counts and FRICTION not in scene.situations]
 
 
@@ -217,5 +211,4 @@ def label(name: str) -> str:
 
 
 def long_label(name: str) -> str:
-    """The same with the profile of a library."""
     return f"{label(name)}, {name.rpartition(':')[2]}" if is_library(name) else label(name)

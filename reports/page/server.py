@@ -45,7 +45,6 @@ async def in_thread(do: Callable[..., T], *arguments: Any) -> T:
 
 
 def application(routes: Sequence[BaseRoute]) -> Starlette:
-    """The web application of these routes, for this machine's own names only."""
     hosts = Middleware(TrustedHostMiddleware, allowed_hosts=list(NAMES), www_redirect=False)
     return Starlette(routes=list(routes), middleware=[hosts])
 

@@ -121,13 +121,11 @@ def mark_of_file(path: str) -> Mark:
 
 
 def marks() -> list[Mark]:
-    """Every mark of an engine, of `PALETTE` and of the exact answer, each once."""
     rows = [mark for mark in marks_of_rows().values() if mark]
     return list(dict.fromkeys([*rows, *PALETTE, OF_TRUTH]))
 
 
 def css_variables(dark: bool) -> str:
-    """The colours of engines as CSS custom properties, named by the light one."""
     return "".join(f"--{mark.light[1:]}:{mark[dark]};" for mark in marks())
 
 

@@ -117,7 +117,6 @@ class Summary:
 
     @cached_property
     def profiles(self) -> dict[str, list[str]]:
-        """Library -> its engines, of those that are ranked."""
         profiles: dict[str, list[str]] = {}
         for name in self.names:
             if is_library(name) and not name.endswith(OWN) and name not in self.untrusted:
@@ -142,12 +141,10 @@ class Summary:
 
     @cached_property
     def libraries(self) -> list[str]:
-        """The engine of each library that is ranked."""
         return [choice.name for choice in self.chosen.values()]
 
     @cached_property
     def columns(self) -> list[str]:
-        """What stands across: libraries, the reader's own, ours."""
         own = [name for name in self.names if name.endswith(OWN)]
         names = [*self.libraries, *own, *(name for name in OURS if name in self.names)]
         return names if self.libraries or own else names or list(self.names)[:8]
@@ -170,7 +167,7 @@ class Summary:
         return {n for n, count in lost.items() if len(scenes) >= MANY and count > len(scenes) / 2}
 
     def error(self, name: str, kind: str) -> float:
-        """The median error in a situation; inf where an engine fails in half of the scenes."""
+        # the median; inf where an engine fails in half of the scenes
         metric = ANGLE if kind == SPIN else ERROR
         errors = [s.error(stand_in(name, s), metric=metric) for s in self.situations[kind]]
         known = [error for error in errors if not np.isnan(error)]
@@ -196,18 +193,16 @@ class Summary:
         return {key: time * steps[key[0]] for key, time in times.items() if time is not None}
 
     def cost(self, name: str, kind: str) -> float:
-        """µs of a step: geometric mean of the timed scenes of a situation."""
+        # µs of a step, geometric mean of the timed scenes
         keys = [(scene.name, stand_in(name, scene)) for scene in self.situations[kind]]
         costs = [self.costs[key] for key in keys if key in self.costs]
         return float(np.exp(np.mean(np.log(costs)))) if costs else np.nan
 
     def best(self, kind: str) -> float:
-        """The smallest error of a library."""
         errors = [self.error(name, kind) for name in self.libraries]
         return min((error for error in errors if not np.isnan(error)), default=np.nan)
 
     def is_near(self, name: str, kind: str) -> bool:
-        """Whether a library is nearest, or in a tie with the nearest."""
         error = self.error(name, kind)
         limit = max(TIE * self.best(kind), RIGHT)
         return name in self.libraries and error <= limit and error < LOST
@@ -262,7 +257,6 @@ class Summary:
         return TableCell(error_text(error), css=css, side=side, notes=tuple(notes))
 
     def heading(self, name: str) -> TableCell:
-        """The heading of a column: the engine, and what it is."""
         engine, _, profile = name.rpartition(":")
         about = LIBRARIES.get(engine, ("", "yours" if name.endswith(OWN) else ""))[1]
         if name in OURS:
@@ -278,7 +272,6 @@ class Summary:
         return TableCell(title, name, link, notes=(TableCell(about, css="soft"),))
 
     def section(self) -> Section:
-        """The first section of the report: situations down, engines across."""
         kinds = [kind for kind in MEANING if kind in self.situations]
         cells = {
             k: [self.cell(name, kind) for kind in kinds] for k, name in enumerate(self.columns)
@@ -308,7 +301,6 @@ class Summary:
         return Section("", says, [Table(frame, css="main stack")])
 
     def sentences(self) -> list[Markup]:
-        """What the table says, in three sentences."""
         if len(self.libraries) < 2 or WITHOUT not in self.situations:
             return []
         near = self.nearest(WITHOUT)
@@ -363,7 +355,6 @@ class Summary:
 def summarize(
     comparisons: Sequence[Comparison], untrusted: Iterable[str] = (), clock: RunTimes = NO_CLOCK
 ) -> Summary:
-    """The summary of these scenes."""
     names = list(dict.fromkeys(run.name for each in comparisons for run in each.runs))
     return Summary(scenes_of(comparisons), names, frozenset(untrusted), clock)
 
@@ -382,8 +373,7 @@ def tied(near: Sequence[str]) -> Markup:
 
 
 def rounded(dt: float) -> float:
-    """A step size to the digits that timings.csv may have."""
-    return float(f"{dt:.5g}")
+    return float(f"{dt:.5g}")  # timings.csv has six digits
 
 
 def step_text(dt: float) -> str:

@@ -117,7 +117,6 @@ def cost_against_size(summary: Summary) -> Section | None:
 
 
 def limits(summary: Summary) -> Section | None:
-    """Where each method fails, from the limits that the repository keeps; None without them."""
     # an installation has no tests
     folders = [parent / "tests" / "data" for parent in Path(__file__).parents]
     files = [folder / name for name in LIMITS for folder in folders if (folder / name).is_file()]
