@@ -34,9 +34,10 @@ def url() -> Iterator[str]:
 
 
 @contextmanager
-def paused(browser: Browser, url: str) -> Iterator[Page]:
+def paused(browser: Browser, url: str, width: int = 1280, height: int = 900) -> Iterator[Page]:
+    """The game, paused at its first frame; whatever it complained of fails the test."""
     page, heard = opened(
-        browser, url, viewport={"width": 1280, "height": 900}, reduced_motion="reduce"
+        browser, url, viewport={"width": width, "height": height}, reduced_motion="reduce"
     )
     page.wait_for_function("() => game.field")
     yield page
