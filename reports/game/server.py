@@ -104,14 +104,13 @@ def labels(names: Sequence[str]) -> dict[str, str]:
     """How the field calls each engine: a solver's file by as much of the end of its path as tells
     it from the others, all else by its name."""
     paths = {name: Path(name.removesuffix(OWN)).parts for name in names if name.endswith(OWN)}
-    found = {name: name for name in names}
+    ends = {name: name for name in names}
     for name, parts in paths.items():
-        others = [other for one, other in paths.items() if one != name]
-        ends = (parts[-k:] for k in range(1, len(parts) + 1))
-        found[name] = "/".join(
-            next((end for end in ends if all(o[-len(end) :] != end for o in others)), parts)
-        )
-    return found
+        others = [path for key, path in paths.items() if key != name]
+        tails = (parts[-k:] for k in range(1, len(parts) + 1))
+        unique = (tail for tail in tails if all(path[-len(tail) :] != tail for path in others))
+        ends[name] = "/".join(next(unique, parts))
+    return ends
 
 
 async def send(socket: WebSocket, answer: dict[str, Any]) -> None:

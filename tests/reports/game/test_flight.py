@@ -36,12 +36,13 @@ from crosscheck2d.reports.game.flight import (
     FRAME,
     SHIP,
     Flight,
+    Flyer,
     field_scenario,
     free_place,
 )
 from crosscheck2d.scenarios.families.exercise import SHIP as START
 from crosscheck2d.scenarios.files.scene_file import read_scene_file, scene_text
-from crosscheck2d.scenarios.model import Scene
+from crosscheck2d.scenarios.model import Array, Scene, State
 from crosscheck2d.scenarios.no_truth import NoTruth
 from crosscheck2d.scenarios.truth.closed_forms import world_thrusts
 
@@ -80,6 +81,15 @@ def flown(
         flight.key(key, down)
     flight.advance(frames - flight.frame)
     return flight
+
+
+def put_ship(flight: Flight, flyer: Flyer, **values: Array) -> State:
+    """The state of an engine, loaded anew with these of its ship."""
+    state = flyer.engine.read()
+    for name, value in values.items():
+        getattr(state, name)[SHIP] = value
+    flyer.engine.load(replace(flight.scenario.scene, **vars(state)), flight.dt)
+    return state
 
 
 def bits(flight: Flight) -> list[dict[str, bytes]]:
@@ -432,9 +442,7 @@ def test_ghosts_are_compared_after_the_ship_was_set_back():
     flight = flown(names, 300, [(0, "s", True), (260, "s", False)], asteroids=0)
     together = [(len(flyer.edges), flyer.divergence) for flyer in flight.flyers]
     struck = flight.flyers[1]
-    state = struck.engine.read()
-    state.velocity[SHIP] += 0.5
-    struck.engine.load(replace(flight.scenario.scene, **vars(state)), flight.dt)
+    state = put_ship(flight, struck, velocity=struck.state.velocity[SHIP] + 0.5)
     ahead = ContactImpulse(0, SHIP, -1, 1.0)  # of the next frame
     struck.touches.note([ahead], flight.frame, state, flight.frame * FRAME)
     flight.advance(20)
@@ -448,9 +456,7 @@ def test_ghosts_are_compared_after_the_ship_was_set_back():
 def test_a_ship_that_leaves_in_one_engine_only_diverges_at_the_edge():
     flight = flown(["reference:exercise", "pymunk:matched"], 200, [(0, "s", True)], asteroids=0)
     slow = flight.flyers[1]
-    state = slow.engine.read()
-    state.position[SHIP, 0] += 0.3
-    slow.engine.load(replace(flight.scenario.scene, **vars(state)), flight.dt)
+    put_ship(flight, slow, position=slow.state.position[SHIP] + [0.3, 0.0])
     while flight.left_at < 0:
         flight.advance()
     soon = slow.divergence
@@ -494,9 +500,7 @@ def test_a_velocity_that_differs_without_a_collision_is_said_to():
     names = ["reference:exercise", "pymunk:matched"]
     flight = flown(names, 40, [(0, "w", True), (20, "w", False)], asteroids=0)
     slow = flight.flyers[1]
-    state = slow.engine.read()
-    state.velocity[SHIP] *= 0.5
-    slow.engine.load(replace(flight.scenario.scene, **vars(state)), flight.dt)
+    put_ship(flight, slow, velocity=slow.state.velocity[SHIP] / 2)
     flight.advance(WAIT)
 
     assert slow.divergence is not None
