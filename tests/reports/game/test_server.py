@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import http.client
 import json
+import re
 import signal
 import socket
 import subprocess
@@ -250,11 +251,11 @@ def test_ctrl_c_stops_it_cleanly_and_a_taken_port_is_reported(served: Served, tm
             "--engine cut.js --engine reference", ["cut.js: SyntaxError"], marks=pytest.mark.slow
         ),
         pytest.param(
-            "--engine empty.js --engine 0.js --engine throws.js",
-            ["empty.js: has neither the functions of the exercise", "throws.js: Error: not today"],
+            "--engine bytes.js --engine 0.js --engine empty.js",
+            ["bytes.js: is not text", "empty.js: has neither the functions of the exercise"],
             marks=pytest.mark.slow,
         ),
-        pytest.param("--engine bytes.js", ["bytes.js: is not text"], marks=pytest.mark.slow),
+        pytest.param("--engine throws.js", ["^throws.js: .*not today"], marks=pytest.mark.slow),
         pytest.param(
             "--engine walls.js",
             ["walls.js: does not model more than one disk"],
@@ -273,8 +274,8 @@ def test_bad_input_is_a_line_each_and_nothing_is_served(
 
     assert (done.returncode, done.stdout) == (2, "")
     assert len(done.stderr.splitlines()) == len(lines)
-    for line, start in zip(done.stderr.splitlines(), lines):
-        assert start in line
+    for line, pattern in zip(done.stderr.splitlines(), lines):
+        assert re.search(pattern, line)
         assert line.count(".js: ") <= 1
     assert list(ENGINES) == engines
 
