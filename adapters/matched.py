@@ -35,7 +35,7 @@ class Searched:
 
 
 def searched(path: Path = TABLE) -> list[dict[str, str]]:
-    """The rows of the table, in reading order: see `crosscheck2d.reports.tune.search.COLUMNS`."""
+    """The rows of the table, in reading order: see `crosscheck2d.reports.tune.command.COLUMNS`."""
     with path.open(newline="", encoding="utf-8") as file:
         return list(csv.DictReader(file))
 

@@ -56,8 +56,6 @@ class ShownRuns(pd.DataFrame):
 
 
 class ShownScene(Scenario):
-    """A scenario that draws its start."""
-
     def _repr_html_(self) -> str:
         return framed(self.name, [kit.Section("", self.asks, [start_of(self)])])
 
@@ -198,7 +196,6 @@ def raising() -> Iterator[None]:
 
 
 def as_run(ended: Run | Failure, name: str, substeps: int, scenario: Scenario) -> Run:
-    """The run of a cell, though its process has failed."""
     if isinstance(ended, Run):
         return ended
     lost = unplayed_run(name, scenario, scenario.dt(substeps))
@@ -206,7 +203,6 @@ def as_run(ended: Run | Failure, name: str, substeps: int, scenario: Scenario) -
 
 
 def framed(title: str, sections: Sequence[kit.Section]) -> str:
-    """A page of its own within a notebook, as high as it is."""
     page = kit.Page(title, sections, "crosscheck2d", names=[*ENGINES, style.TRUTH], footer=" ")
     return (
         f'<iframe srcdoc="{escape(kit.render_page(page))}" onload="{HEIGHT}"'
@@ -215,7 +211,6 @@ def framed(title: str, sections: Sequence[kit.Section]) -> str:
 
 
 def replay_of(scenario: Scenario, layers: list[tuple[Run | None, Trajectory]]) -> kit.Playback:
-    """What was played, the exact answer on top."""
     return kit.Playback(pack_layers(scenario, layers), ratio_of(scenario, layers))
 
 

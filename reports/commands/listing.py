@@ -5,7 +5,8 @@ from __future__ import annotations
 from crosscheck2d.adapters.engine_row import EngineRow
 from crosscheck2d.adapters.engines import ENGINES, FETCHED, packages
 from crosscheck2d.adapters.npm_packages import missing
-from crosscheck2d.reports.compare.metrics import METRICS, SCALES, Metric
+from crosscheck2d.reports.compare.metrics import METRICS, Metric
+from crosscheck2d.reports.compare.scales import SCALES
 from crosscheck2d.reports.compare.verdicts import VERDICTS, Kind
 from crosscheck2d.reports.lessons.catalogue import LESSONS
 from crosscheck2d.reports.run.arguments import unknown

@@ -20,8 +20,8 @@ from crosscheck2d.adapters.engines import (
     read_row,
 )
 from crosscheck2d.adapters.host.file import HINTS, KINDS, NotASolver
-from crosscheck2d.adapters.library_at_version import LibraryAtVersion
-from crosscheck2d.adapters.npm_packages import ABSENT, NotInstalled, fetch, missing, version_of
+from crosscheck2d.adapters.library_at_version import ABSENT, LibraryAtVersion, NotInstalled
+from crosscheck2d.adapters.npm_packages import fetch, missing, version_of
 from crosscheck2d.reports.run.scenes import open_scene, with_steps
 from crosscheck2d.reports.run.store import Store, reading, writing
 from crosscheck2d.reports.terminal.console import Console

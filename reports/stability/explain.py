@@ -34,7 +34,7 @@ from crosscheck2d.reports.compare.causes import (
     by_mechanisms,
     unknown,
 )
-from crosscheck2d.reports.compare.faces import ALONG, first_on_line
+from crosscheck2d.reports.compare.collisions import ALONG, first_on_line
 from crosscheck2d.reports.compare.verdicts import Verdict
 from crosscheck2d.reports.stability.cases import CASES
 from crosscheck2d.reports.stability.limits import NEVER_FAILS, Case, Limit, LimitSearch

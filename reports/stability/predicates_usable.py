@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from crosscheck2d.reports.compare import laws
-from crosscheck2d.reports.compare.collisions import match, pair_keys, who
-from crosscheck2d.reports.compare.faces import on_faces, thrown_off
+from crosscheck2d.reports.compare.collisions import match, on_faces, pair_keys, thrown_off, who
 from crosscheck2d.reports.compare.verdicts import MOST_LOST, MOST_OVERLAP, Verdict, verdicts
 from crosscheck2d.reports.compare.view import cut
 from crosscheck2d.reports.stability.predicates import Predicate, largest, read, worst_of

@@ -14,7 +14,7 @@ from crosscheck2d.adapters.engines import FETCHED, row_of
 from crosscheck2d.adapters.npm_packages import missing
 from crosscheck2d.adapters.play import play_once
 from crosscheck2d.reports.compare.causes import CauseKind
-from crosscheck2d.reports.compare.faces import first_on_line, on_faces, thrown_off
+from crosscheck2d.reports.compare.collisions import first_on_line, on_faces, thrown_off
 from crosscheck2d.reports.stability.cases import CASES as LIMITS_OF
 from crosscheck2d.reports.stability.explain import explained, with_replays
 from crosscheck2d.reports.stability.limits import QUICK, Limit, LimitSearch
