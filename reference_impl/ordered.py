@@ -30,12 +30,12 @@ from .meetings import (
     INDEXED,
     LEEWAY,
     NOBODY,
-    ask_all,
     change,
     contact,
     empty_agenda,
-    first_due,
-    first_of_all,
+    first_meeting,
+    first_of_all_pairs,
+    list_meetings,
     path_of,
 )
 from .neighbour_list import (
@@ -71,7 +71,7 @@ class Accelerations(NamedTuple):
     now: np.ndarray  # (n, 2) m/s2, and by what holds those at rest until the end of a step
     turning: np.ndarray  # (n,) rad/s2
     held: np.ndarray  # (n,) what holds the disk in this step, as an index of `LEEWAY`
-    moving: np.ndarray  # (m, 2) who moves, as `moving` has it
+    moving: np.ndarray  # (m, 2) the disks that move, as `moving` has them
     strongest: float  # m/s2, of the steady ones
 
 
@@ -100,7 +100,6 @@ def advance(disks: Disks, world: World, dt: float, count: int) -> list:
 
 @compiled
 def accelerations_of(disks: Disks, world: World) -> Accelerations:
-    """By force, torque and gravity."""
     steady, turning = np.zeros_like(disks.velocity), np.zeros_like(disks.angle)
     strongest2 = 0.0
     for i in range(len(disks.mass)):
@@ -116,7 +115,7 @@ def accelerations_of(disks: Disks, world: World) -> Accelerations:
 
 
 @kernel
-def fly_until_meeting(  # type: ignore[no-untyped-def]
+def fly_until_meeting(
     disks: Disks, world: World, acceleration, near: NeighbourList, agenda, dt, k: int, count: int
 ) -> int:
     """Take steps from step k on until one in which two meet or the list is used up: in that one all
@@ -129,7 +128,7 @@ def fly_until_meeting(  # type: ignore[no-untyped-def]
         take_step(near, acceleration.strongest * dt * dt)
         if used_up(near):
             break
-        ask_all(disks, world, acceleration, near, agenda, -dt)
+        list_meetings(disks, world, acceleration, near, agenda, -dt)
         if agenda.length[DUE] > 0:
             break
         k += 1
@@ -170,16 +169,16 @@ def turn(disks: Disks, acceleration: Accelerations, dt: float, count: int) -> No
 
 
 @inlined
-def resolve(  # type: ignore[no-untyped-def]
+def resolve(
     disks, world, acceleration, near, agenda, dt: float, k: int, count: int, collisions, pressed
 ) -> None:
     """Meeting after meeting of a step in which all have flown to its end."""
     most, held, any_held, now = MOST * len(disks.radius), acceleration.held, False, -dt
     for c in range(most + 1):
         if holds(near):
-            first = first_due(disks, world, acceleration, near, agenda, now, dt)
+            first = first_meeting(disks, world, acceleration, near, agenda, now, dt)
         else:
-            first = first_of_all(disks, world, acceleration, near, now)
+            first = first_of_all_pairs(disks, world, acceleration, near, now)
         now, i, j = first
         alone = near.found[PAIRS] + near.found[WALLS] == 1
         if i == NOBODY or (c == most and (alone or world.restitution == 1.0)):
@@ -228,8 +227,8 @@ def resolve(  # type: ignore[no-untyped-def]
 
 
 @compiled
-def find_near(  # type: ignore[no-untyped-def]
-    disks: Disks, world: World, acceleration, near, agenda, now: float, dt: float, left: int
+def find_near(
+    disks: Disks, world: World, acceleration, near, agenda, now: float, dt: float, steps: int
 ) -> None:
     """Build the list at the end of a step, and put down all meetings from `now` on: in the step,
     each may have been a step away from its end."""
@@ -238,15 +237,15 @@ def find_near(  # type: ignore[no-untyped-def]
         if disks.mass[i] != inf:
             longest = max(longest, way_of(disks, acceleration.now, i, dt))
     near.length[STRIDE] = longest
-    build_list(near, disks.position, disks.radius, world, left)
+    build_list(near, disks.position, disks.radius, world, steps)
     near.length[SLACK] -= longest
     agenda.length[INDEXED] = 0
     if holds(near):
-        ask_all(disks, world, acceleration, near, agenda, now)
+        list_meetings(disks, world, acceleration, near, agenda, now)
 
 
 @kernel
-def way_of(disks: Disks, acceleration, i: int, dt: float) -> float:  # type: ignore[no-untyped-def]
+def way_of(disks: Disks, acceleration, i: int, dt: float) -> float:
     """m: disk i gets no farther in a step."""
     x, v, a = disks.position, disks.velocity, acceleration
     speed = sqrt(v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1])
@@ -255,7 +254,7 @@ def way_of(disks: Disks, acceleration, i: int, dt: float) -> float:  # type: ign
 
 
 @compiled
-def move(x, remainder, i: int, axis: int, way: float) -> None:  # type: ignore[no-untyped-def]
+def move(x, remainder, i: int, axis: int, way: float) -> None:
     """Move disk i as `fly` does, and keep what rounding cuts off."""
     before, way = x[i, axis], way + remainder[i, axis]
     x[i, axis] = before + way
@@ -263,13 +262,13 @@ def move(x, remainder, i: int, axis: int, way: float) -> None:  # type: ignore[n
 
 
 @kernel
-def weights(mass, i: int, j: int) -> tuple[float, float]:  # type: ignore[no-untyped-def]
+def weights(mass, i: int, j: int) -> tuple[float, float]:
     """1/kg of the two; a wall's is 0."""
     return 1.0 / mass[i], 1.0 / mass[j] if j >= 0 else 0.0
 
 
 @compiled
-def lift(path, s: float, nx: float, ny: float) -> float:  # type: ignore[no-untyped-def]
+def lift(path, s: float, nx: float, ny: float) -> float:
     """m/s2 at which the gap opens at s as one slides past the other: v2 / distance, and nothing
     along a wall's face.
 
@@ -291,7 +290,7 @@ def lift(path, s: float, nx: float, ny: float) -> float:  # type: ignore[no-unty
 
 
 @compiled
-def collide(  # type: ignore[no-untyped-def]
+def collide(
     disks: Disks, world: World, acceleration, i: int, j: int, s: float, dt, low: float, alone: bool
 ) -> tuple[float, float]:
     """The impulse J = -(1 + e) (vi - vj).n / (1/mi + 1/mj) at s, and both on their new ways to the
@@ -315,7 +314,7 @@ def collide(  # type: ignore[no-untyped-def]
 
 
 @compiled
-def release(  # type: ignore[no-untyped-def]
+def release(
     disks, world, acceleration, near, agenda, i, j, s: float, dt, collisions, pressed
 ) -> None:
     """From s on, no force holds a contact of disk i or j that a collision has opened."""
@@ -333,7 +332,7 @@ def release(  # type: ignore[no-untyped-def]
 
 
 @compiled
-def settle(  # type: ignore[no-untyped-def]
+def settle(
     disks, world, acceleration, near, agenda, first, level: int, dt: float, k, collisions, pressed
 ) -> tuple[float, float]:
     """All that touch the two that meet first, and each other, at once: the impulses without bounce
@@ -345,27 +344,27 @@ def settle(  # type: ignore[no-untyped-def]
     """
     s, e, strongest = first[0], world.restitution, acceleration.strongest
     slow = strongest * dt * REST / (2.0 * e) if e > 0.0 and level < LAST else inf
-    who = touching(disks, world, acceleration.now, near, first, REACH[level], slow)
-    m = len(who)
+    contacts = touching(disks, world, acceleration.now, near, first, REACH[level], slow)
+    m = len(contacts)
     if m < 2:
         return collide(disks, world, acceleration.now, first[1], first[2], s, dt, 0.0, True)
     place, push = np.full(m, -1), np.zeros((2, m))  # impulses in N s, forces in N
     for c in range(m):
         for p in range(len(pressed)):
-            if pressed[p][0] == who[c][0] and pressed[p][1] == who[c][1]:
+            if pressed[p][0] == contacts[c][0] and pressed[p][1] == contacts[c][1]:
                 place[c], push[1, c] = p, pressed[p][3]
-    start, left = push[1].copy(), min(LEEWAY[level], COARSE)
-    push_together(disks, world, acceleration, who, push, left, s, dt)
+    start, tolerance = push[1].copy(), min(LEEWAY[level], COARSE)
+    push_together(disks, world, acceleration, contacts, push, tolerance, s, dt)
     if world.friction > 0.0:
         for c in range(m):
-            i, j = who[c]
+            i, j = contacts[c]
             path = path_of(disks, world, acceleration.now, i, j)
             _, _, nx, ny = contact(path, s)
             most, rise = world.friction * push[0, c], max(push[1, c] - start[c], 0.0)
             rub(disks, acceleration.now, i, j, path, nx, ny, most, world.friction * rise, s)
-        push_together(disks, world, acceleration, who, push, left, s, dt)
+        push_together(disks, world, acceleration, contacts, push, tolerance, s, dt)
     for c in range(m):
-        i, j = who[c]
+        i, j = contacts[c]
         p, hold, impulse = int(place[c]), push[1, c], push[0, c] - (push[1, c] - start[c]) * s
         if p >= 0:
             row = pressed[p][2]
@@ -382,16 +381,16 @@ def settle(  # type: ignore[no-untyped-def]
 
 
 @compiled
-def touching(disks, world, acceleration, near, first, reach: float, slow: float) -> list:  # type: ignore[no-untyped-def]
+def touching(disks, world, acceleration, near, first, reach: float, slow: float) -> list:
     """The contacts (i, j) that join the two that meet first and all that touch them in turn: closer
     than `reach` radii, and closing by less than `slow` m/s."""
-    mass, pairs, s, who = disks.mass, near.found[PAIRS], first[0], [(0, 0) for _ in range(0)]
+    mass, pairs, s, contacts = disks.mass, near.found[PAIRS], first[0], [(0, 0) for _ in range(0)]
     joined, taken = np.zeros(len(mass), np.bool_), np.zeros(pairs + near.found[WALLS], np.bool_)
     count = -1
     for d in (first[1], max(first[1], first[2])):
         joined[d] = mass[d] != inf
-    while count != len(who) and holds(near):
-        count = len(who)
+    while count != len(contacts) and holds(near):
+        count = len(contacts)
         for p in range(len(taken)):
             i = np.int64(near.first[p] if p < pairs else near.disk[p - pairs])
             j = np.int64(near.second[p]) if p < pairs else -1 - np.int64(near.wall[p - pairs])
@@ -401,20 +400,22 @@ def touching(disks, world, acceleration, near, first, reach: float, slow: float)
             gap, rate, _, _ = contact(path, s)
             if gap < reach * path[8] and -rate < slow:
                 taken[p] = True
-                who.append((int(i), int(j)))
+                contacts.append((int(i), int(j)))
                 for d in (i, max(i, j)):
                     joined[d] = mass[d] != inf
-    return who
+    return contacts
 
 
 @compiled
-def push_together(disks, world, acceleration, who, push, left: float, s: float, dt: float) -> None:  # type: ignore[no-untyped-def]
+def push_together(
+    disks, world, acceleration, contacts, push, tolerance: float, s: float, dt: float
+) -> None:
     """Change the impulses push[0] and then the forces push[1] (m,) of these contacts, from s on."""
-    m, h = len(who), max(-s, EXACT * dt)
+    m, h = len(contacts), max(-s, EXACT * dt)
     normal, weight, open = np.empty((m, 2)), np.empty((m, 2)), np.empty(m)
     for held in range(2):  # by an impulse, by a force
         for c in range(m):
-            i, j = who[c]
+            i, j = contacts[c]
             path = path_of(disks, world, acceleration.now, i, j)
             gap, rate, nx, ny = contact(path, s)
             open[c] = rate + max(gap, 0.0) / h
@@ -425,18 +426,20 @@ def push_together(disks, world, acceleration, who, push, left: float, s: float, 
             weight[c, 0], weight[c, 1] = weights(disks.mass, i, j)
         before, scale = push[held].copy(), acceleration.strongest * (1.0 if held else h)
         bodies = len(disks.mass) + len(world.walls)
-        press(who, weight, normal, open, push[held], bodies, left, scale)
+        press(contacts, weight, normal, open, push[held], bodies, tolerance, scale)
         for c in range(m):
-            i, j = who[c]
+            i, j = contacts[c]
             change, nx, ny = push[held, c] - before[c], normal[c, 0], normal[c, 1]
             J, hold = (0.0, change) if held else (change, 0.0)
             push_apart(disks, acceleration.now, i, j, nx, ny, J, hold, s)
 
 
 @compiled
-def press(who, weight, normal, open, push, bodies: int, left: float, scale: float) -> None:  # type: ignore[no-untyped-def]
+def press(
+    contacts, weight, normal, open, push, bodies: int, tolerance: float, scale: float
+) -> None:
     """Change the pushes (m,) >= 0 of the contacts along their normals until `open` (m,), how fast
-    each opens, is 0 where a contact pushes and >= 0 elsewhere: but for what is `left` of the scale.
+    each opens, is 0 where a contact pushes and >= 0 elsewhere, to `tolerance` of the scale.
 
     It is the minimum of a quadratic function over push >= 0 (the dual of Gauss's least constraint),
     found by conjugate gradients over those that push (Polyak, USSR Comput. Math. 9, 94, 1969): in a
@@ -451,7 +454,7 @@ def press(who, weight, normal, open, push, bodies: int, left: float, scale: floa
         for c in range(m):
             square += open[c] * open[c] if pushes[c] else 0.0
             closing += open[c] * open[c] if open[c] < 0.0 and not pushes[c] else 0.0
-        if max(square, closing) <= left * left * scale * scale:
+        if max(square, closing) <= tolerance * tolerance * scale * scale:
             break
         join = closing > square
         if join:
@@ -460,7 +463,7 @@ def press(who, weight, normal, open, push, bodies: int, left: float, scale: floa
         for c in range(m):
             pushes[c] = pushes[c] or (join and open[c] < 0.0)
             along[c] = share * along[c] - open[c] if pushes[c] else 0.0
-        respond(who, weight, normal, along, way, effect)
+        respond(contacts, weight, normal, along, way, effect)
         for c in range(m):
             curvature += along[c] * effect[c]
         length, last, stops = square / curvature, square, -1
@@ -475,23 +478,23 @@ def press(who, weight, normal, open, push, bodies: int, left: float, scale: floa
 
 
 @compiled
-def respond(who, weight, normal, push, way, effect) -> None:  # type: ignore[no-untyped-def]
+def respond(contacts, weight, normal, push, way, effect) -> None:
     """What pushes (m,) change in how fast each contact opens: effect (m,). Wall w, which never
     moves, is row -1 - w of `way`, so counts from its end."""
     way[:] = 0.0
     for c in range(len(push)):
-        i, j = who[c]
+        i, j = contacts[c]
         for axis in range(2):
             way[i, axis] += weight[c, 0] * push[c] * normal[c, axis]
             way[j, axis] -= weight[c, 1] * push[c] * normal[c, axis]
     for c in range(len(push)):
-        i, j = who[c]
+        i, j = contacts[c]
         x, y = way[i, 0] - way[j, 0], way[i, 1] - way[j, 1]
         effect[c] = normal[c, 0] * x + normal[c, 1] * y
 
 
 @compiled
-def push_apart(  # type: ignore[no-untyped-def]
+def push_apart(
     disks, acceleration, i: int, j: int, nx: float, ny: float, J: float, hold: float, s: float
 ) -> None:
     """From s on, as if the two had left with the impulse J and the force `hold` along n."""
@@ -507,7 +510,7 @@ def push_apart(  # type: ignore[no-untyped-def]
 
 
 @compiled
-def rub(  # type: ignore[no-untyped-def]
+def rub(
     disks, acceleration, i: int, j: int, path, nx, ny, most: float, most_held: float, s: float
 ) -> None:
     """Coulomb's friction from s on: at most the impulse `most` at once, then at most the force
@@ -548,7 +551,7 @@ def rub(  # type: ignore[no-untyped-def]
 
 
 @compiled
-def carry_over(x, world: World, i: int) -> None:  # type: ignore[no-untyped-def]
+def carry_over(x, world: World, i: int) -> None:
     """A centre that is set onto the opposite edge as it leaves and flies on ends a box away."""
     for axis in range(2):
         if x[i, axis] < world.low[axis]:

@@ -19,6 +19,7 @@ from crosscheck2d.adapters.mechanisms.contacts import (
     carried_off,
     closing,
     detect,
+    detect_again,
     drive_to_target,
     gap_along,
     gap_of,
@@ -26,7 +27,6 @@ from crosscheck2d.adapters.mechanisms.contacts import (
     rub,
     turn,
 )
-from crosscheck2d.adapters.mechanisms.recycling import detect_again
 from crosscheck2d.reference_impl.compiled import compiled, internal, pasted
 from crosscheck2d.reference_impl.coulomb import carry_over, collide, collide_wall
 from crosscheck2d.reference_impl.exercise import touching, touching_wall, wrap
@@ -51,24 +51,8 @@ STAGES = (
     "relax",
     "restitute",
 )
-(
-    ACCELERATE,
-    MOVE,
-    PAIRS,
-    WALLS,
-    DETECT,
-    BY_ISLAND,
-    BY_COLOUR,
-    AIM,
-    WARM_START,
-    BOUNCE,
-    CAP,
-    POSITION_CORRECTION,
-    NUDGE,
-    SOFTEN,
-    RELAX,
-    RESTITUTE,
-) = range(len(STAGES))
+ACCELERATE, MOVE, PAIRS, WALLS, DETECT, BY_ISLAND, BY_COLOUR, AIM = range(8)
+WARM_START, BOUNCE, CAP, POSITION_CORRECTION, NUDGE, SOFTEN, RELAX, RESTITUTE = range(8, 16)
 
 
 class Parameters(NamedTuple):
@@ -141,7 +125,6 @@ def act(  # noqa: C901, PLR0912 - a branch for each stage: numba has no table of
     k: int,
     collisions: list[Collision],
 ) -> None:
-    """One stage."""
     if stage == ACCELERATE:
         accelerate(disks, world, h)
     elif stage == MOVE:
@@ -181,7 +164,6 @@ def act(  # noqa: C901, PLR0912 - a branch for each stage: numba has no table of
 
 @internal
 def accelerate(disks: Disks, world: World, h: float) -> None:
-    """v += a h for disks that can move; the angular velocity alike."""
     for i in range(len(disks.mass)):
         if disks.mass[i] != inf:
             for axis in range(2):
@@ -221,7 +203,7 @@ def move(disks: Disks, world: World, on: Parameters, kept: Contacts, h: float) -
 
 
 @internal
-def turn_along(angle, facing, i: int, by: float) -> None:  # type: ignore[no-untyped-def]
+def turn_along(angle, facing, i: int, by: float) -> None:
     """Turn (cos, sin) of disk i along its tangent, and normalise it (Box2D 3.1,
     b2IntegrateRotation): by atan(by), and by what rounding (cos, sin) adds."""
     c, s = facing[i, 0] - facing[i, 1] * by, facing[i, 1] + facing[i, 0] * by
@@ -233,7 +215,6 @@ def turn_along(angle, facing, i: int, by: float) -> None:  # type: ignore[no-unt
 
 @compiled
 def pairs(disks: Disks, world: World, on: Parameters, k: int, collisions: list[Collision]) -> None:
-    """Task 2 of the exercise for each pair of disks in turn."""
     x, radius = disks.position, disks.radius
     for i in range(len(radius)):
         for j in range(i + 1, len(radius)):
@@ -243,7 +224,6 @@ def pairs(disks: Disks, world: World, on: Parameters, k: int, collisions: list[C
 
 @compiled
 def walls(disks: Disks, world: World, on: Parameters, k: int, collisions: list[Collision]) -> None:
-    """Task 2 of the exercise for each disk and wall in turn."""
     x, radius = disks.position, disks.radius
     for i in range(len(radius)):
         for w in range(len(world.walls)):
@@ -282,7 +262,7 @@ def meet(
 
 
 @compiled
-def aim(v, restitution: float, on: Parameters, kept: Contacts) -> None:  # type: ignore[no-untyped-def]
+def aim(v, restitution: float, on: Parameters, kept: Contacts) -> None:
     """Set the target velocity of every contact, before any impulse: e times the closing speed, 0
     for slow collisions.
 
@@ -327,8 +307,7 @@ def bounce(disks: Disks, world: World, on: Parameters, kept: Contacts) -> None:
 
 
 @internal
-def cap(v, most: float, h: float) -> None:  # type: ignore[no-untyped-def]
-    """Cut velocities that would move a disk by more than `most` m."""
+def cap(v, most: float, h: float) -> None:
     for i in range(len(v)):
         far = sqrt(v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1]) * h
         if far > most:
@@ -370,7 +349,7 @@ def correct_island(
 
 
 @internal
-def nudge(mass, on: Parameters, kept: Contacts, h: float) -> None:  # type: ignore[no-untyped-def]
+def nudge(mass, on: Parameters, kept: Contacts, h: float) -> None:
     """Give overlapping disks a velocity for the next move only, which undoes a fraction of the
     overlap beyond the slop."""
     for c in range(kept.found[0]):

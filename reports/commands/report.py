@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
+from crosscheck2d.adapters.advance import off_grid_note
 from crosscheck2d.adapters.engines import OWN, row_of
 from crosscheck2d.adapters.run import STATUSES
-from crosscheck2d.adapters.thrust_grid import off_grid_note
 from crosscheck2d.reports.commands.medians import medians
 from crosscheck2d.reports.commands.own_solvers import lines
 from crosscheck2d.reports.compare.fast_disks import fast_note

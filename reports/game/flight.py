@@ -14,9 +14,9 @@ import numpy as np
 from crosscheck2d.adapters.advance import advance
 from crosscheck2d.adapters.engine import Engine
 from crosscheck2d.adapters.engines import ENGINES
-from crosscheck2d.adapters.first_collisions import weight_impulse
 from crosscheck2d.adapters.host.engine import GuestEngine
-from crosscheck2d.adapters.runaway import RUNAWAY, fault_of, reach
+from crosscheck2d.adapters.play import RUNAWAY, fault_of, reach
+from crosscheck2d.adapters.run import weight_impulse
 from crosscheck2d.reports.compare.laws import nearer_way
 from crosscheck2d.reports.game.divergence import (
     NEVER,

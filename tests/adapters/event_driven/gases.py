@@ -81,7 +81,6 @@ def collisions_of(engine):
 
 
 def state_after(scene, until, torus=None, cell=0.0):
-    """The engine, and position and velocity at `until` s."""
     engine = EventEngine(scene, torus, cell)
     engine.advance(until)
     return engine, *engine.motion_at(until)
