@@ -1,4 +1,4 @@
-"""The one loop that plays a scenario on an engine, and the states from which it cannot go on."""
+"""The one loop that plays a scenario on an engine."""
 
 from __future__ import annotations
 
@@ -6,16 +6,12 @@ from collections.abc import Callable
 from contextlib import closing
 from dataclasses import replace
 
-import numpy as np
-
 from crosscheck2d.adapters.advance import advanced
 from crosscheck2d.adapters.engine import Engine, NotStarted, Unsupported
 from crosscheck2d.adapters.friction import Frictionless
-from crosscheck2d.adapters.run import Run, collisions_of, gather, substeps_of, unplayed_run
+from crosscheck2d.adapters.run import Run, collisions_of, fault_of, gather, reach, substeps_of
 from crosscheck2d.scenarios.model import Scenario, State
 
-# times the largest distance of free flight: a disk farther out was thrown by the engine
-RUNAWAY = 1e3
 Watch = Callable[[State], None]  # called with every valid sample
 
 
@@ -34,7 +30,7 @@ def play_once(
         engine = make()
     except ImportError as missing:
         reason = f"{missing.name or missing} cannot be imported: {missing}"
-        return replace(unplayed_run(name, scenario, dt), status="unsupported", reason=reason)
+        return replace(Run.unplayed(name, scenario, dt), status="unsupported", reason=reason)
     with closing(engine):
         return play(engine, name, scenario, dt, watch)
 
@@ -47,8 +43,8 @@ def play(engine: Engine, name: str, scenario: Scenario, dt: float, watch: Watch 
     `MemoryError` and `NotStarted` pass, which are not the engine's fault.
     """
     substeps = substeps_of(scenario, dt)
-    run, states, seconds = unplayed_run(name, scenario, dt), list[State](), 0.0
-    farthest = RUNAWAY * reach(scenario)
+    run, states, seconds = Run.unplayed(name, scenario, dt), list[State](), 0.0
+    farthest = reach(scenario)
     try:
         engine.load(scenario.scene, dt)
         run = replace(run, settings=engine.settings(), versions=engine.versions())
@@ -76,36 +72,3 @@ def play(engine: Engine, name: str, scenario: Scenario, dt: float, watch: Watch 
         collisions = collisions_of(engine, scenario.scene, dt)
         run = replace(run, trajectory=gather(scenario, states, collisions))
     return replace(run, seconds=seconds)
-
-
-def reach(scenario: Scenario) -> float:
-    """m from the origin, upper bound for free flight under gravity and thrust."""
-    scene, duration = scenario.scene, scenario.duration
-    thrust = sum(float(np.linalg.norm(t.force)) for t in scenario.thrusts) / scene.mass.min()
-    start = max(
-        np.abs(scene.position).max(), np.abs(scene.walls).max(initial=0.0), scene.radius.max()
-    )
-    return float(
-        start
-        + np.abs(scene.velocity).max() * duration
-        + (np.linalg.norm(scene.gravity) + thrust) * duration * duration / 2
-    )
-
-
-def fault_of(state: State, farthest: float) -> str:
-    """Why a run cannot continue from a state, or ""; `farthest` in m from the origin."""
-    # Called after every sample, so sums of squares are tested first: they are finite only if every
-    # number is.
-    others = state.velocity, state.angle, state.angular_velocity
-    if (
-        np.vdot(state.position, state.position) <= farthest * farthest
-        and sum(np.vdot(a, a) for a in others) < np.inf
-    ):
-        return ""
-    for name in ("position", "velocity", "angle", "angular_velocity"):
-        values = getattr(state, name)
-        if not np.isfinite(values).all():
-            return f"{name} of disk {int(np.argwhere(~np.isfinite(values))[0][0])} is not finite"
-    if len(state.position) and (far := np.abs(state.position).max()) > farthest:
-        return f"a disk is {far:.3g} m away"
-    return ""

@@ -1,5 +1,5 @@
-"""`Run`: one scenario played by one engine; its trajectory; and its collisions, the starts of the
-contacts of an engine that reports an impulse in every step."""
+"""`Run`: one scenario played by one engine; its trajectory; its collisions, the starts of contacts
+if an engine reports an impulse in every step; and the states from which it cannot go on."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from crosscheck2d.scenarios.model import (
     frozen,
 )
 
+RUNAWAY = 1e3  # times the way of free flight: a disk farther out was thrown by the engine
 STATUSES = ("ok", "unsupported", "diverged", "error", "crashed", "timeout")
 
 
@@ -39,6 +40,12 @@ class Run:
     versions: dict[str, str] = field(default_factory=dict)  # library -> version
     frictionless: bool = False  # whether it is refused because the engine models no friction
 
+    @classmethod
+    def unplayed(cls, name: str, scenario: Scenario, dt: float) -> Run:
+        """Of `engine:profile`, without a trajectory yet."""
+        engine, profile = name.split(":")
+        return cls(engine, profile, scenario.name, dt)
+
     @property
     def name(self) -> str:
         return f"{self.engine}:{self.profile}"
@@ -46,11 +53,6 @@ class Run:
     @property
     def silent(self) -> bool:
         return bool(self.settings.get("collisions", (None, None))[1] == SILENT)
-
-
-def unplayed_run(name: str, scenario: Scenario, dt: float) -> Run:
-    engine, profile = name.split(":")
-    return Run(engine, profile, scenario.name, dt)
 
 
 def gather(scenario: Scenario, states: Sequence[State], collisions: Collisions) -> Trajectory:
@@ -124,3 +126,36 @@ def first_collisions(
 
 def first_of_pair(disk: np.ndarray, other: np.ndarray) -> np.ndarray:
     return np.append(True, (np.diff(disk) != 0) | (np.diff(other) != 0))
+
+
+def reach(scenario: Scenario) -> float:
+    """m from the origin, `RUNAWAY` times what free flight under gravity and thrust can reach."""
+    scene, duration = scenario.scene, scenario.duration
+    thrust = sum(float(np.linalg.norm(t.force)) for t in scenario.thrusts) / scene.mass.min()
+    start = max(
+        np.abs(scene.position).max(), np.abs(scene.walls).max(initial=0.0), scene.radius.max()
+    )
+    return RUNAWAY * float(
+        start
+        + np.abs(scene.velocity).max() * duration
+        + (np.linalg.norm(scene.gravity) + thrust) * duration * duration / 2
+    )
+
+
+def fault_of(state: State, farthest: float) -> str:
+    """Why a run cannot continue from a state, or ""; `farthest` in m from the origin."""
+    # Called after every sample, so sums of squares are tested first: they are finite only if every
+    # number is.
+    others = state.velocity, state.angle, state.angular_velocity
+    if (
+        np.vdot(state.position, state.position) <= farthest * farthest
+        and sum(np.vdot(a, a) for a in others) < np.inf
+    ):
+        return ""
+    for name in ("position", "velocity", "angle", "angular_velocity"):
+        values = getattr(state, name)
+        if not np.isfinite(values).all():
+            return f"{name} of disk {int(np.argwhere(~np.isfinite(values))[0][0])} is not finite"
+    if len(state.position) and (far := np.abs(state.position).max()) > farthest:
+        return f"a disk is {far:.3g} m away"
+    return ""

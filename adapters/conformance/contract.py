@@ -36,7 +36,7 @@ from crosscheck2d.adapters.conformance.probe import (
 )
 from crosscheck2d.adapters.engine import Unsupported
 from crosscheck2d.adapters.engine_row import FLOAT32, EngineRow
-from crosscheck2d.adapters.play import fault_of
+from crosscheck2d.adapters.run import fault_of
 from crosscheck2d.scenarios.model import Scene
 
 # a scale, an inverse mass, a product, a sum: the most roundings between a force and a velocity

@@ -27,7 +27,7 @@ from crosscheck2d.adapters.mechanisms.contacts import (
     rub,
     turn,
 )
-from crosscheck2d.reference_impl.compiled import compiled, internal, pasted
+from crosscheck2d.reference_impl.compiled import compiled, internal
 from crosscheck2d.reference_impl.coulomb import carry_over, collide, collide_wall
 from crosscheck2d.reference_impl.exercise import touching, touching_wall, wrap
 from crosscheck2d.reference_impl.state import Disks, World
@@ -92,7 +92,7 @@ class Parameters(NamedTuple):
 
 
 @compiled
-def advance(
+def advance(  # noqa: C901, PLR0912 - a branch for each stage: numba has no table of functions
     disks: Disks, world: World, on: Parameters, kept: Contacts, h: float, count: int
 ) -> list[Collision]:
     """Advance `count` steps, each move by `h` s; return the collisions as `exercise.advance`
@@ -103,7 +103,41 @@ def advance(
             kept.start[i, 0], kept.start[i, 1] = disks.position[i, 0], disks.position[i, 1]
         kept.moved[:], kept.turned[:] = 0.0, 0.0
         for stage in on.order:
-            act(stage, disks, world, on, kept, h, k, collisions)
+            if stage == ACCELERATE:
+                accelerate(disks, world, h)
+            elif stage == MOVE:
+                move(disks, world, on, kept, h)
+            elif stage == PAIRS:
+                pairs(disks, world, on, k, collisions)
+            elif stage == WALLS:
+                walls(disks, world, on, k, collisions)
+            elif stage == DETECT:
+                if on.recycled > 0.0:
+                    detect_again(disks, world, on.margin, on.recycled, on.fattened, kept)
+                else:
+                    detect(disks, world, on.margin, on.skin, on.touching, on.memory, kept)
+            elif stage == BY_ISLAND:
+                by_island(disks.mass, kept)
+            elif stage == BY_COLOUR:
+                by_colour(disks.mass, kept)
+            elif stage == AIM:
+                aim(disks.velocity, world.restitution, on, kept)
+            elif stage == WARM_START:
+                warm_start(disks, on, kept)
+            elif stage == BOUNCE:
+                bounce(disks, world, on, kept)
+            elif stage == CAP:
+                cap(disks.velocity, on.cap, h)
+            elif stage == POSITION_CORRECTION:
+                position_correction(disks, world, on, kept)
+            elif stage == NUDGE:
+                nudge(disks.mass, on, kept, h)
+            elif stage == SOFTEN:
+                soften(disks, world, on, kept, h, True)
+            elif stage == RELAX:
+                soften(disks, world, on, kept, h, False)
+            elif stage == RESTITUTE:
+                restitute(disks, world, on, kept)
         for c in range(kept.found[0]):
             if kept.rows[c].impulse > 0.0:
                 collisions.append((k, kept.rows[c].i, kept.rows[c].j, kept.rows[c].impulse))
@@ -112,54 +146,6 @@ def advance(
         else:
             carry_over(disks.position, world)
     return collisions
-
-
-@pasted
-def act(  # noqa: C901, PLR0912 - a branch for each stage: numba has no table of functions
-    stage: int,
-    disks: Disks,
-    world: World,
-    on: Parameters,
-    kept: Contacts,
-    h: float,
-    k: int,
-    collisions: list[Collision],
-) -> None:
-    if stage == ACCELERATE:
-        accelerate(disks, world, h)
-    elif stage == MOVE:
-        move(disks, world, on, kept, h)
-    elif stage == PAIRS:
-        pairs(disks, world, on, k, collisions)
-    elif stage == WALLS:
-        walls(disks, world, on, k, collisions)
-    elif stage == DETECT:
-        if on.recycled > 0.0:
-            detect_again(disks, world, on.margin, on.recycled, on.fattened, kept)
-        else:
-            detect(disks, world, on.margin, on.skin, on.touching, on.memory, kept)
-    elif stage == BY_ISLAND:
-        by_island(disks.mass, kept)
-    elif stage == BY_COLOUR:
-        by_colour(disks.mass, kept)
-    elif stage == AIM:
-        aim(disks.velocity, world.restitution, on, kept)
-    elif stage == WARM_START:
-        warm_start(disks, on, kept)
-    elif stage == BOUNCE:
-        bounce(disks, world, on, kept)
-    elif stage == CAP:
-        cap(disks.velocity, on.cap, h)
-    elif stage == POSITION_CORRECTION:
-        position_correction(disks, world, on, kept)
-    elif stage == NUDGE:
-        nudge(disks.mass, on, kept, h)
-    elif stage == SOFTEN:
-        soften(disks, world, on, kept, h, True)
-    elif stage == RELAX:
-        soften(disks, world, on, kept, h, False)
-    elif stage == RESTITUTE:
-        restitute(disks, world, on, kept)
 
 
 @internal

@@ -15,8 +15,7 @@ from crosscheck2d.adapters.advance import advance
 from crosscheck2d.adapters.engine import Engine
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.adapters.host.engine import GuestEngine
-from crosscheck2d.adapters.play import RUNAWAY, fault_of, reach
-from crosscheck2d.adapters.run import weight_impulse
+from crosscheck2d.adapters.run import fault_of, reach, weight_impulse
 from crosscheck2d.reports.compare.laws import nearer_way
 from crosscheck2d.reports.game.divergence import (
     NEVER,
@@ -145,7 +144,7 @@ class Flight:
         self.dt = scenario.dt(self.substeps)
         wrap = scenario.scene.wrap
         self.is_game = wrap is not None and np.array_equal(wrap, [LOW, HIGH])
-        self.farthest = RUNAWAY * reach(scenario)
+        self.farthest = reach(scenario)
         self.pilot = Pilot(scenario.scene, scenario.sample_interval)
         self.steered = scenario  # with the thrusts of the keys that are down
         self.frame, self.left_at, self.won_at = 0, -1, -1

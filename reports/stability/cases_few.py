@@ -10,8 +10,7 @@ from math import sqrt
 import numpy as np
 
 from crosscheck2d.adapters.engine import Unsupported
-from crosscheck2d.adapters.play import fault_of
-from crosscheck2d.adapters.run import Run, gather
+from crosscheck2d.adapters.run import Run, fault_of, gather
 from crosscheck2d.reports.stability.limits import Case
 from crosscheck2d.reports.stability.predicates import (
     ANGLE_OFF,

@@ -97,7 +97,7 @@ def test_a_late_collision_is_off_by_the_change_of_velocity_times_its_delay():
 def test_a_ball_gains_speed_times_dt_of_height_where_it_bounces_off_a_velocity_after_gravity(
     order: tuple[str, ...], gain: float
 ):
-    # And nothing where it bounces off that before: per bounce, with the flight of such an engine.
+    # A gain per bounce, with the flight of such an engine; none off a velocity before gravity.
     scene = scenario("bouncing_ball_e1")
     dt, g = scene.dt(4), -scene.scene.gravity[1]
     fall = scene.scene.position[0, 1] - scene.scene.radius[0]

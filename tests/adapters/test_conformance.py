@@ -184,7 +184,7 @@ def test_box2d_v3_turns_by_the_arc_tangent_a_substep(substeps_in_1s):
 
 @pytest.mark.parametrize("e", [0.0, 0.25, 0.5, 0.9, 1.0])
 def test_the_friction_of_box2d_v3_is_bounded_by_the_impulse_before_restitution(e):
-    # So its effective coefficient is 0.6 / (1 + e), where Box2D 2.3 has 0.2 at every e.
+    # Its effective coefficient is 0.6 / (1 + e), where Box2D 2.3 has 0.2 at every e.
     for name, coefficient in (("box2d_v3:shipped", 0.6 / (1 + e)), ("box2d:shipped", 0.2)):
         with loaded(ENGINES[name], replace(head_on(2.0, spin=40.0), restitution=e)) as engine:
             before = engine.read().velocity[1]

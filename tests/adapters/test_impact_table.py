@@ -185,7 +185,7 @@ def test_the_threshold_of_box2d_is_found_where_it_is_compiled_in():
 
 
 def test_the_cap_on_spin_is_a_quarter_or_an_eighth_of_a_turn_a_step():
-    # So it depends on the step: 300 rad/s are below it at 1/256 s in Box2D 2.3.
+    # It depends on the step: 300 rad/s are below it at 1/256 s in Box2D 2.3.
     caps = {("box2d", COARSE): 60 / 4, ("box2d_v3", COARSE): 60 / 8, ("box2d_v3", FINE): 256 / 8}
     for (engine, dt), turns in caps.items():
         # float32; and Box2D 3.1 turns (cos, sin), whose length is rounded

@@ -77,8 +77,7 @@ def test_an_engine_whose_library_is_missing_refuses_by_its_name():
 
 
 def test_no_source_file_closes_an_engine_by_hand():
-    # But the game and the gases, whose engines outlive a function: all else is `play_once` or
-    # `closing`.
+    # The engines of the game and the gases outlive a function; else it is `play_once` or `closing`.
     root = Path(__file__).parents[2]
     found = {
         path.relative_to(root).as_posix()

@@ -84,3 +84,7 @@ def state_after(scene, until, torus=None, cell=0.0):
     engine = EventEngine(scene, torus, cell)
     engine.advance(until)
     return engine, *engine.motion_at(until)
+
+
+def after(scene, until):
+    return state_after(scene, until)[1:]

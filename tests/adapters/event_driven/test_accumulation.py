@@ -19,7 +19,7 @@ from crosscheck2d.scenarios.model import Scenario, Scene
 from crosscheck2d.scenarios.no_truth import NoTruth
 from crosscheck2d.scenarios.truth.closed_forms import bouncing
 from crosscheck2d.scenarios.truth.exact import computed
-from tests.adapters.event_driven.gases import gas
+from tests.adapters.event_driven.gases import after, gas
 from tests.adapters.event_driven.test_brute_force import plain_kernels
 
 CROSS = [[[-1.0, -1.0], [1.0, 1.0]], [[-1.0, 1.0], [1.0, -1.0]]]
@@ -30,12 +30,6 @@ def disk(position, velocity=(0.0, 0.0), restitution=0.0, **fields):
     return Scene(
         position=[position], velocity=[velocity], restitution=restitution, **(arrays | fields)
     )
-
-
-def after(scene, until):
-    engine = EventEngine(scene)
-    engine.advance(until)
-    return engine.motion_at(until)
 
 
 @pytest.mark.parametrize("e", [0.0, 0.02, 0.5, 0.9])

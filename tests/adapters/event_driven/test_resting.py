@@ -16,6 +16,7 @@ from crosscheck2d.scenarios.families.placing import box, scatter
 from crosscheck2d.scenarios.model import Scene
 from crosscheck2d.scenarios.no_truth import NoTruth
 from crosscheck2d.scenarios.truth.closed_forms import bouncing
+from tests.adapters.event_driven.gases import after
 from tests.adapters.event_driven.test_brute_force import plain_kernels
 
 G = 10.0
@@ -26,12 +27,6 @@ def disks(position, velocity, restitution, **fields):
     n = len(position)
     arrays = {"radius": np.full(n, 0.5), "mass": np.ones(n), "walls": FLOOR, "gravity": [0.0, -G]}
     return Scene(position=position, velocity=velocity, restitution=restitution, **(arrays | fields))
-
-
-def after(scene, until):
-    engine = EventEngine(scene)
-    engine.advance(until)
-    return engine.motion_at(until)
 
 
 @pytest.mark.parametrize("e", [0.0, 0.1, 0.5, 0.9, 0.99])
