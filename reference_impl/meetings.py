@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .compiled import compiled, internal, kernel
-from .neighbour_list import EDGES, PAIRS, STRIDE, WALLS, NeighbourList, account_for
+from .neighbour_list import EDGES, PAIRS, ROUNDING, STRIDE, WALLS, NeighbourList, account_for
 from .state import Disks, World
 
 NOBODY, EDGE = -1, 1 << 30  # in place of a disk: none, and the edge of the world
@@ -126,9 +126,20 @@ def index_rows(near: NeighbourList, agenda: Agenda) -> None:
 
 
 @kernel
-def change(disks: Disks, near: NeighbourList, agenda: Agenda, d: int, way: float) -> None:
-    """Disk d goes another way from now on, and gets no farther than `way` m in a step."""
-    account_for(near, disks.position, d, way)
+def way_in_step(disks: Disks, acceleration, i: int, dt: float) -> float:
+    """m: disk i gets no farther in a step."""
+    x, v, a = disks.position, disks.velocity, acceleration
+    speed = sqrt(v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1])
+    strength = sqrt(a[i, 0] * a[i, 0] + a[i, 1] * a[i, 1])
+    return (speed + strength * abs(dt)) * abs(dt) + ROUNDING * max(abs(x[i, 0]), abs(x[i, 1]))
+
+
+@kernel
+def mark_changed(
+    disks: Disks, acceleration, near: NeighbourList, agenda: Agenda, d: int, dt: float
+) -> None:
+    """Disk d goes another way from now on."""
+    account_for(near, disks.position, d, way_in_step(disks, acceleration.now, d, dt))
     if not agenda.stale[d]:
         agenda.stale[d], agenda.changed[agenda.length[CHANGED]] = True, d
         agenda.length[CHANGED] += 1

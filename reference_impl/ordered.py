@@ -30,17 +30,17 @@ from .meetings import (
     INDEXED,
     LEEWAY,
     NOBODY,
-    change,
     contact,
     empty_agenda,
     first_meeting,
     first_of_all_pairs,
     list_meetings,
+    mark_changed,
     path_of,
+    way_in_step,
 )
 from .neighbour_list import (
     PAIRS,
-    ROUNDING,
     SLACK,
     STRIDE,
     WALLS,
@@ -60,7 +60,7 @@ MOST = 8  # collisions a disk and step, on average
 # reach, in radii.
 ALONE, LAST = 1, 5
 REACH = 0.0, 0.0, 2.0**-30, 2.0**-16, 2.0**-2, inf
-TURNS = 6  # of `press` a contact, at most
+TURNS = 6  # of `solve_pushes` a contact, at most
 TOGETHER = -1.0  # in place of an impulse: perhaps others touch these two
 
 
@@ -80,7 +80,7 @@ def advance(disks: Disks, world: World, dt: float, count: int) -> list:
     """Advance `count` steps of `dt` s; return the collisions as (step, i, j, impulse in N s), wall
     w as j = -1 - w."""
     collisions = [(0, 0, 0, 0.0) for _ in range(0)]  # empty, but numba must know what it will hold
-    pressed = [(0, 0, 0, 0.0) for _ in range(0)]  # (i, j, row of the collision, force in N)
+    pushed = [(0, 0, 0, 0.0) for _ in range(0)]  # (i, j, row of the collision, force in N)
     acceleration, k = accelerations_of(disks, world), 0
     near = empty_list(disks.radius, len(world.walls))
     agenda = empty_agenda(near)
@@ -91,7 +91,7 @@ def advance(disks: Disks, world: World, dt: float, count: int) -> list:
         if used_up(near):
             find_near(disks, world, acceleration, near, agenda, -dt, dt, count - k)
         if agenda.length[DUE] > 0 or not holds(near):
-            resolve(disks, world, acceleration, near, agenda, dt, k, count, collisions, pressed)
+            resolve(disks, world, acceleration, near, agenda, dt, k, count, collisions, pushed)
         k += 1
     if world.friction == 0.0:
         turn(disks, acceleration, dt, count)
@@ -170,7 +170,7 @@ def turn(disks: Disks, acceleration: Accelerations, dt: float, count: int) -> No
 
 @inlined
 def resolve(
-    disks, world, acceleration, near, agenda, dt: float, k: int, count: int, collisions, pressed
+    disks, world, acceleration, near, agenda, dt: float, k: int, count: int, collisions, pushed
 ) -> None:
     """Meeting after meeting of a step in which all have flown to its end."""
     most, held, any_held, now = MOST * len(disks.radius), acceleration.held, False, -dt
@@ -205,25 +205,25 @@ def resolve(
                     dt,
                     k,
                     collisions,
-                    pressed,
+                    pushed,
                 )
             if impulse > 0.0:
-                if len(pressed) > 0:
+                if len(pushed) > 0:
                     release(
-                        disks, world, acceleration, near, agenda, i, j, now, dt, collisions, pressed
+                        disks, world, acceleration, near, agenda, i, j, now, dt, collisions, pushed
                     )
                 collisions.append((k, i, j, impulse))
                 if hold > 0.0 and not alone:
-                    pressed.append((i, j, len(collisions) - 1, hold))
+                    pushed.append((i, j, len(collisions) - 1, hold))
                     held[i], held[max(i, j)] = max(held[i], ALONE), max(held[max(i, j)], ALONE)
-            change(disks, near, agenda, i, way_of(disks, acceleration.now, i, dt))
+            mark_changed(disks, acceleration, near, agenda, i, dt)
             if j >= 0:
-                change(disks, near, agenda, j, way_of(disks, acceleration.now, j, dt))
+                mark_changed(disks, acceleration, near, agenda, j, dt)
         if not holds(near):
             find_near(disks, world, acceleration, near, agenda, now, dt, count - k)
     if any_held:
         held[:] = 0
-        pressed.clear()
+        pushed.clear()
 
 
 @compiled
@@ -235,22 +235,13 @@ def find_near(
     longest = 0.0
     for i in range(len(disks.mass)):
         if disks.mass[i] != inf:
-            longest = max(longest, way_of(disks, acceleration.now, i, dt))
+            longest = max(longest, way_in_step(disks, acceleration.now, i, dt))
     near.length[STRIDE] = longest
     build_list(near, disks.position, disks.radius, world, steps)
     near.length[SLACK] -= longest
     agenda.length[INDEXED] = 0
     if holds(near):
         list_meetings(disks, world, acceleration, near, agenda, now)
-
-
-@kernel
-def way_of(disks: Disks, acceleration, i: int, dt: float) -> float:
-    """m: disk i gets no farther in a step."""
-    x, v, a = disks.position, disks.velocity, acceleration
-    speed = sqrt(v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1])
-    strength = sqrt(a[i, 0] * a[i, 0] + a[i, 1] * a[i, 1])
-    return (speed + strength * abs(dt)) * abs(dt) + ROUNDING * max(abs(x[i, 0]), abs(x[i, 1]))
 
 
 @compiled
@@ -268,11 +259,11 @@ def weights(mass, i: int, j: int) -> tuple[float, float]:
 
 
 @compiled
-def lift(path, s: float, nx: float, ny: float) -> float:
+def opening_acceleration(path, s: float, nx: float, ny: float) -> float:
     """m/s2 at which the gap opens at s as one slides past the other: v2 / distance, and nothing
     along a wall's face.
 
-    Two that touch and slide past each other part, however hard they are pressed together, if that
+    Two that touch and slide past each other part, however hard they are pushed together, if that
     is more.
     """
     x, y, u, v, a, b, along, up, _ = path
@@ -299,7 +290,10 @@ def collide(
     e, hold, path = world.restitution, 0.0, path_of(disks, world, acceleration, i, j)
     wi, wj = weights(disks.mass, i, j)
     _, rate, nx, ny = contact(path, s)
-    speed, inward = max(-rate, 0.0), -(path[4] * nx + path[5] * ny) - lift(path, s, nx, ny)
+    speed, inward = (
+        max(-rate, 0.0),
+        -(path[4] * nx + path[5] * ny) - opening_acceleration(path, s, nx, ny),
+    )
     # it would be back at once, and ever sooner: it rests, and is held
     rests = 2.0 * e * speed < inward * dt * REST
     if not alone and (rests or 2.0 * e * speed < low):
@@ -307,33 +301,35 @@ def collide(
     if rests:
         e, hold = 0.0, inward / (wi + wj)
     J = (1.0 + e) * speed / (wi + wj)
-    push_apart(disks, acceleration, i, j, nx, ny, J, hold, s)
+    apply_push(disks, acceleration, i, j, nx, ny, J, hold, s)
     if world.friction > 0.0:
-        rub(disks, acceleration, i, j, path, nx, ny, world.friction * J, world.friction * hold, s)
+        apply_friction(
+            disks, acceleration, i, j, path, nx, ny, world.friction * J, world.friction * hold, s
+        )
     return J - hold * s, hold
 
 
 @compiled
 def release(
-    disks, world, acceleration, near, agenda, i, j, s: float, dt, collisions, pressed
+    disks, world, acceleration, near, agenda, i, j, s: float, dt, collisions, pushed
 ) -> None:
     """From s on, no force holds a contact of disk i or j that a collision has opened."""
-    for p in range(len(pressed)):
-        a, b, row, hold = pressed[p]
+    for p in range(len(pushed)):
+        a, b, row, hold = pushed[p]
         if hold > 0.0 and (a in (i, j) or b in (i, j)):
             _, rate, nx, ny = contact(path_of(disks, world, acceleration.now, a, b), s)
             if rate > COARSE * acceleration.strongest * dt:
-                push_apart(disks, acceleration.now, a, b, nx, ny, 0.0, -hold, s)
+                apply_push(disks, acceleration.now, a, b, nx, ny, 0.0, -hold, s)
                 k, _, _, impulse = collisions[row]
                 collisions[row] = (k, a, b, impulse + hold * s)
-                pressed[p] = (a, b, row, 0.0)
+                pushed[p] = (a, b, row, 0.0)
                 for d in (a, max(a, b)):
-                    change(disks, near, agenda, d, way_of(disks, acceleration.now, d, dt))
+                    mark_changed(disks, acceleration, near, agenda, d, dt)
 
 
 @compiled
 def settle(
-    disks, world, acceleration, near, agenda, first, level: int, dt: float, k, collisions, pressed
+    disks, world, acceleration, near, agenda, first, level: int, dt: float, k, collisions, pushed
 ) -> tuple[float, float]:
     """All that touch the two that meet first, and each other, at once: the impulses without bounce
     and then the forces, all >= 0, with which no gap of theirs closes before the end of the step.
@@ -350,33 +346,35 @@ def settle(
         return collide(disks, world, acceleration.now, first[1], first[2], s, dt, 0.0, True)
     place, push = np.full(m, -1), np.zeros((2, m))  # impulses in N s, forces in N
     for c in range(m):
-        for p in range(len(pressed)):
-            if pressed[p][0] == contacts[c][0] and pressed[p][1] == contacts[c][1]:
-                place[c], push[1, c] = p, pressed[p][3]
+        for p in range(len(pushed)):
+            if pushed[p][0] == contacts[c][0] and pushed[p][1] == contacts[c][1]:
+                place[c], push[1, c] = p, pushed[p][3]
     start, tolerance = push[1].copy(), min(LEEWAY[level], COARSE)
-    push_together(disks, world, acceleration, contacts, push, tolerance, s, dt)
+    push_contacts(disks, world, acceleration, contacts, push, tolerance, s, dt)
     if world.friction > 0.0:
         for c in range(m):
             i, j = contacts[c]
             path = path_of(disks, world, acceleration.now, i, j)
             _, _, nx, ny = contact(path, s)
             most, rise = world.friction * push[0, c], max(push[1, c] - start[c], 0.0)
-            rub(disks, acceleration.now, i, j, path, nx, ny, most, world.friction * rise, s)
-        push_together(disks, world, acceleration, contacts, push, tolerance, s, dt)
+            apply_friction(
+                disks, acceleration.now, i, j, path, nx, ny, most, world.friction * rise, s
+            )
+        push_contacts(disks, world, acceleration, contacts, push, tolerance, s, dt)
     for c in range(m):
         i, j = contacts[c]
         p, hold, impulse = int(place[c]), push[1, c], push[0, c] - (push[1, c] - start[c]) * s
         if p >= 0:
-            row = pressed[p][2]
+            row = pushed[p][2]
             collisions[row] = (k, i, j, collisions[row][3] + impulse)
-            pressed[p] = (i, j, row, hold)
+            pushed[p] = (i, j, row, hold)
         elif impulse > 0.0:
-            pressed.append((i, j, len(collisions), hold))
+            pushed.append((i, j, len(collisions), hold))
             collisions.append((k, i, j, impulse))
         for d in (i, max(i, j)):
             if disks.mass[d] != inf:
                 acceleration.held[d] = level
-                change(disks, near, agenda, d, way_of(disks, acceleration.now, d, dt))
+                mark_changed(disks, acceleration, near, agenda, d, dt)
     return TOGETHER, 0.0
 
 
@@ -407,7 +405,7 @@ def touching(disks, world, acceleration, near, first, reach: float, slow: float)
 
 
 @compiled
-def push_together(
+def push_contacts(
     disks, world, acceleration, contacts, push, tolerance: float, s: float, dt: float
 ) -> None:
     """Change the impulses push[0] and then the forces push[1] (m,) of these contacts, from s on."""
@@ -421,21 +419,21 @@ def push_together(
             open[c] = rate + max(gap, 0.0) / h
             if held:
                 straight = path[4] * nx + path[5] * ny
-                open[c] = 2.0 * open[c] / h + straight + lift(path, s, nx, ny)
+                open[c] = 2.0 * open[c] / h + straight + opening_acceleration(path, s, nx, ny)
             normal[c, 0], normal[c, 1] = nx, ny
             weight[c, 0], weight[c, 1] = weights(disks.mass, i, j)
         before, scale = push[held].copy(), acceleration.strongest * (1.0 if held else h)
         bodies = len(disks.mass) + len(world.walls)
-        press(contacts, weight, normal, open, push[held], bodies, tolerance, scale)
+        solve_pushes(contacts, weight, normal, open, push[held], bodies, tolerance, scale)
         for c in range(m):
             i, j = contacts[c]
             change, nx, ny = push[held, c] - before[c], normal[c, 0], normal[c, 1]
             J, hold = (0.0, change) if held else (change, 0.0)
-            push_apart(disks, acceleration.now, i, j, nx, ny, J, hold, s)
+            apply_push(disks, acceleration.now, i, j, nx, ny, J, hold, s)
 
 
 @compiled
-def press(
+def solve_pushes(
     contacts, weight, normal, open, push, bodies: int, tolerance: float, scale: float
 ) -> None:
     """Change the pushes (m,) >= 0 of the contacts along their normals until `open` (m,), how fast
@@ -463,7 +461,7 @@ def press(
         for c in range(m):
             pushes[c] = pushes[c] or (join and open[c] < 0.0)
             along[c] = share * along[c] - open[c] if pushes[c] else 0.0
-        respond(contacts, weight, normal, along, way, effect)
+        compute_effect(contacts, weight, normal, along, way, effect)
         for c in range(m):
             curvature += along[c] * effect[c]
         length, last, stops = square / curvature, square, -1
@@ -478,7 +476,7 @@ def press(
 
 
 @compiled
-def respond(contacts, weight, normal, push, way, effect) -> None:
+def compute_effect(contacts, weight, normal, push, way, effect) -> None:
     """What pushes (m,) change in how fast each contact opens: effect (m,). Wall w, which never
     moves, is row -1 - w of `way`, so counts from its end."""
     way[:] = 0.0
@@ -494,7 +492,7 @@ def respond(contacts, weight, normal, push, way, effect) -> None:
 
 
 @compiled
-def push_apart(
+def apply_push(
     disks, acceleration, i: int, j: int, nx: float, ny: float, J: float, hold: float, s: float
 ) -> None:
     """From s on, as if the two had left with the impulse J and the force `hold` along n."""
@@ -510,7 +508,7 @@ def push_apart(
 
 
 @compiled
-def rub(
+def apply_friction(
     disks, acceleration, i: int, j: int, path, nx, ny, most: float, most_held: float, s: float
 ) -> None:
     """Coulomb's friction from s on: at most the impulse `most` at once, then at most the force

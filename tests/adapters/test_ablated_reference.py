@@ -25,9 +25,8 @@ from crosscheck2d.adapters.mechanisms.table import (
     mechanisms_of,
     with_mechanisms,
 )
-from crosscheck2d.adapters.play import play
+from crosscheck2d.adapters.play import play, play_once
 from crosscheck2d.adapters.reference import Reference
-from crosscheck2d.adapters.run import Run
 from crosscheck2d.reference_impl import exercise
 from crosscheck2d.scenarios.catalogue import scenario
 from crosscheck2d.scenarios.families.placing import lay_out
@@ -110,13 +109,6 @@ def test_a_ball_gains_speed_times_dt_of_height_where_it_bounces_off_a_velocity_a
     assert apex / (speed * dt) == pytest.approx(gain, abs=0.1)
 
 
-def run_of(name: str, scene: Scenario, dt: float) -> Run:
-    engine = ENGINES[name].make()
-    run = play(engine, name, scene, dt)
-    engine.close()
-    return run
-
-
 @pytest.mark.parametrize(
     ("name", "scene", "samples", "bound"),
     [
@@ -142,7 +134,7 @@ def test_with_all_its_mechanisms_the_reference_is_the_engine(
     played = scenario(scene)
     played = replace(played, duration=samples * played.sample_interval)
     dt = played.dt(4)
-    run = run_of(name, played, dt)
+    run = play_once(ENGINES[name].make, name, played, dt)
     assert run.trajectory is not None
     mechanisms = mechanisms_of(name, run.settings, played.scene, dt)
     everything = positions(with_mechanisms(mechanisms), played, dt)
@@ -167,7 +159,9 @@ def test_what_is_disabled_in_the_engine_is_what_is_left_out_in_the_reference(
 ):
     played = scenario(scene)
     dt = played.dt(4)
-    mechanisms = mechanisms_of(name, run_of(name, played, dt).settings, played.scene, dt)
+    mechanisms = mechanisms_of(
+        name, play_once(ENGINES[name].make, name, played, dt).settings, played.scene, dt
+    )
     left_out = next(each for each in mechanisms if each.name == mechanism)
     assert left_out.without is not None
     engine = left_out.without()
@@ -188,7 +182,10 @@ def test_every_engine_with_mechanisms_is_known_and_flies_as_its_row_says():
         mechanisms = {
             each.name: each
             for each in mechanisms_of(
-                name, run_of(name, scene, 0.1 / 6).settings, scene.scene, 0.1 / 6
+                name,
+                play_once(ENGINES[name].make, name, scene, 0.1 / 6).settings,
+                scene.scene,
+                0.1 / 6,
             )
         }
         assert mechanisms[FLIGHT].parameters == {"alpha": ENGINES[name].alpha}

@@ -23,7 +23,7 @@ from crosscheck2d.adapters.conformance.probe import (
 from crosscheck2d.adapters.engine import NOT_REPORTED, Unsupported
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.adapters.mechanisms import ablated_reference
-from crosscheck2d.adapters.play import play
+from crosscheck2d.adapters.play import play, play_once
 from crosscheck2d.adapters.reference import METHODS, Reference
 from crosscheck2d.adapters.run import STATUSES
 from crosscheck2d.reference_impl import exercise
@@ -45,11 +45,7 @@ def asked(scene, thrusts=(), duration=1.0, sample_interval=0.1):
 
 
 def played(name, scenario, dt):
-    engine = ENGINES[name].make()
-    try:
-        return play(engine, name, scenario, dt)
-    finally:
-        engine.close()
+    return play_once(ENGINES[name].make, name, scenario, dt)
 
 
 def played_or_skipped(name, scenario, dt):
@@ -68,21 +64,8 @@ def or_skipped():
 
 
 def arrays(trajectory):
-    collisions = trajectory.collisions
-    return [
-        array.tobytes()
-        for array in (
-            trajectory.t,
-            trajectory.position,
-            trajectory.velocity,
-            trajectory.angle,
-            trajectory.angular_velocity,
-            collisions.t,
-            collisions.i,
-            collisions.j,
-            collisions.impulse,
-        )
-    ]
+    fields = vars(trajectory) | vars(trajectory.collisions)
+    return [array.tobytes() for array in fields.values() if isinstance(array, np.ndarray)]
 
 
 @pytest.mark.parametrize("name", ENGINES)

@@ -3,7 +3,6 @@ exercise."""
 
 from __future__ import annotations
 
-from contextlib import closing
 from math import isnan
 
 import numpy as np
@@ -16,7 +15,7 @@ from crosscheck2d.adapters.engines import FETCHED, UNASKED, row_of
 from crosscheck2d.adapters.mechanisms.ablated import AblatedReference
 from crosscheck2d.adapters.mechanisms.table import EDGES, mechanisms_of, with_mechanisms
 from crosscheck2d.adapters.npm_packages import missing
-from crosscheck2d.adapters.play import play
+from crosscheck2d.adapters.play import play, play_once
 from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.compare.laws import deviation
 from crosscheck2d.reports.compare.metrics import METRICS
@@ -46,8 +45,7 @@ def torus(**changed: object) -> Scenario:
 def run_of(name: str, scenario: Scenario, substeps: int) -> Run:
     if name in FETCHED and (reason := missing(FETCHED[name].package)):
         pytest.skip(reason)
-    with closing(row_of(name).make()) as engine:
-        run = play(engine, name, scenario, scenario.dt(substeps))
+    run = play_once(row_of(name).make, name, scenario, scenario.dt(substeps))
     if run.status == "unsupported":
         pytest.skip(run.reason)
     assert run.trajectory is not None, run.reason
