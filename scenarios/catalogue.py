@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from crosscheck2d.scenarios.families.crowds import CROWDS
-from crosscheck2d.scenarios.families.exercise import EXERCISE
+from crosscheck2d.scenarios.families.exercise import EXERCISE, THRUSTS
 from crosscheck2d.scenarios.families.friction import FRICTION
 from crosscheck2d.scenarios.families.lesson import LESSON
 from crosscheck2d.scenarios.families.pairs import PAIRS
 from crosscheck2d.scenarios.families.rows import ROWS
-from crosscheck2d.scenarios.families.thrusts import THRUSTS
 from crosscheck2d.scenarios.families.walls import WALLS
 from crosscheck2d.scenarios.model import Scenario
 

@@ -11,21 +11,13 @@ from typing import Any
 
 import numpy as np
 
-FINITE = ("position", "velocity", "angle", "angular_velocity", "walls", "gravity")
-
 
 def check_scene(scene: Any) -> None:
-    """Raise `ValueError` with every fault of the shapes, or if these are right, of the values."""
-    if faults := shape_faults(scene) or [
-        *size_faults(scene),
-        *disk_faults(scene),
-        *surrounding_faults(scene),
-    ]:
+    if faults := shape_faults(scene) or [*disk_faults(scene), *surrounding_faults(scene)]:
         raise ValueError("; ".join(faults))
 
 
 def shape_faults(scene: Any) -> list[str]:
-    """A line for every array with a wrong shape."""
     n = len(np.atleast_1d(scene.radius))
     shapes = {
         **dict.fromkeys(("position", "velocity"), (n, 2)),
@@ -43,19 +35,14 @@ def shape_faults(scene: Any) -> list[str]:
     return faults
 
 
-def size_faults(scene: Any) -> list[str]:
-    """A line if there is no disk, and for every array with a number that is not finite."""
+def disk_faults(scene: Any) -> list[str]:
     faults = [] if scene.n else ["radius is empty, must have at least one disk"]
-    return faults + [
+    finite = ("position", "velocity", "angle", "angular_velocity", "walls", "gravity")
+    faults += [
         f"{name} holds a value that is not finite"
-        for name in FINITE
+        for name in finite
         if not np.isfinite(getattr(scene, name)).all()
     ]
-
-
-def disk_faults(scene: Any) -> list[str]:
-    """A line for every invalid radius, mass and inertia, and every static disk that moves."""
-    faults = []
     for i in range(scene.n):
         if not (0 < scene.radius[i] < np.inf):
             faults.append(f"radius[{i}] is {scene.radius[i]:g} m, must be positive and finite")
@@ -69,7 +56,6 @@ def disk_faults(scene: Any) -> list[str]:
 
 
 def surrounding_faults(scene: Any) -> list[str]:
-    """A line for every fault of restitution, friction, walls and the wrap box."""
     faults = []
     for name, most, must in (
         ("restitution", 1.0, "from 0 to 1"),
@@ -82,25 +68,20 @@ def surrounding_faults(scene: Any) -> list[str]:
             faults.append(f"{name} is {value:g}, must be {must}")
     for w in np.flatnonzero((scene.walls[:, 0] == scene.walls[:, 1]).all(axis=1)):
         faults.append(f"walls[{w}] has no length, must go from one point to another")
-    return faults if scene.wrap is None else faults + wrap_faults(scene)
-
-
-def wrap_faults(scene: Any) -> list[str]:
-    """A line if the corners of the wrap box are not in order, else one for every disk outside of
-    it."""
+    if scene.wrap is None:
+        return faults
     low, high = scene.wrap
     if not (low < high).all():
         corners = [low.tolist(), high.tolist()]
-        return [f"wrap is {corners}, must be [low, high] with low below high"]
+        return [*faults, f"wrap is {corners}, must be [low, high] with low below high"]
     outside = ((scene.position < low) | (scene.position > high)).any(axis=1)
-    return [
+    return faults + [
         f"position[{i}] is {scene.position[i].tolist()} m, must be inside the wrap box"
         for i in np.flatnonzero(outside)
     ]
 
 
 def check_thrust(thrust: Any) -> None:
-    """Raise `ValueError` with the first fault."""
     force, torque = thrust.force, thrust.torque
     if force.shape != (2,) or not np.isfinite([*force, torque]).all():
         raise ValueError(
@@ -115,7 +96,6 @@ def check_thrust(thrust: Any) -> None:
 
 
 def check_scenario(scenario: Any) -> None:
-    """Raise `ValueError` with the first fault."""
     if not re.fullmatch(r"[a-z0-9][a-z0-9_-]*", scenario.name):
         raise ValueError(
             f"name is {scenario.name!r}, must be lower-case letters, digits, '_' and '-'"

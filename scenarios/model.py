@@ -2,7 +2,8 @@
 `Collisions`, `Trajectory`).
 
 SI units, float64, y up, counter-clockwise positive. n disks, w walls, k samples, h collisions;
-arrays are read-only. A field that is not as described raises a `ValueError` that names it.
+arrays are read-only. A field that is not as described raises a `ValueError` that names it, its
+value and what it must be.
 """
 
 from __future__ import annotations
@@ -49,17 +50,15 @@ class Scene:
 
     def __post_init__(self) -> None:
         given = {name: value for name, value in vars(self).items() if value is not None}
-        for name, value in (self._defaults() | given).items():
-            one = name in ("restitution", "friction")
-            object.__setattr__(self, name, value if one else frozen(value))
-        check_scene(self)
-
-    def _defaults(self) -> dict[str, Array]:
         radius, mass = np.asarray(self.radius, float), np.asarray(self.mass, float)
         zero = np.zeros(len(np.atleast_1d(radius)))
         solid = mass * radius**2 / 2 if radius.shape == mass.shape else mass
-        of_disks = {"angle": zero, "angular_velocity": zero, "inertia": solid}
-        return of_disks | {"walls": np.zeros((0, 2, 2)), "gravity": np.zeros(2)}
+        defaults = {"angle": zero, "angular_velocity": zero, "inertia": solid}
+        defaults |= {"walls": np.zeros((0, 2, 2)), "gravity": np.zeros(2)}
+        for name, value in (defaults | given).items():
+            scalar = name in ("restitution", "friction")
+            object.__setattr__(self, name, value if scalar else frozen(value))
+        check_scene(self)
 
     @property
     def n(self) -> int:
@@ -102,7 +101,7 @@ class Scenario:
     source: str  # where the scene or its formula comes from
     scene: Scene  # the initial state and the physics
     duration: float  # s, a whole number of sample intervals
-    sample_interval: float  # s; every engine is sampled at i * sample_interval
+    sample_interval: float = 1 / 60  # s; every engine is sampled at i * sample_interval
     substeps: Sequence[int] = (1, 2, 4, 8)  # k of dt = sample_interval / k, coarse to fine
     thrusts: Sequence[Thrust] = ()  # piecewise-constant
     # Times (k,) s -> the exact `Trajectory` at these times, up to its horizon; raises `NoTruth`.

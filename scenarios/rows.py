@@ -46,11 +46,10 @@ class Row(NamedTuple):
 
 
 class Rows:
-    """An open file of rows. A kind is a word such as "cell"; a key is a hash of all that decides
-    the row."""
+    """An open file of rows; `writing` also makes it. A kind is a word such as "cell"; a key is a
+    hash of all that decides the row. All of it raises `Damaged` or `OSError`."""
 
     def __init__(self, path: Path, writing: bool = True) -> None:
-        """Open the file; `writing` also makes it. Raises `Damaged` or `OSError`."""
         self.path = path
         with self.faults():
             self.file = sqlite3.connect(
@@ -66,7 +65,6 @@ class Rows:
                 raise
 
     def begin(self, writing: bool) -> None:
-        """Check the format, or give it to a new file."""
         # No wait for the disk (15 ms a row): a process that is killed loses nothing all the same.
         # After a power failure the file may be damaged, which is noticed.
         self.file.execute("pragma synchronous=off")
@@ -85,7 +83,6 @@ class Rows:
 
     @contextmanager
     def faults(self) -> Iterator[None]:
-        """Context in which an error of SQLite becomes an `OSError` or `Damaged`."""
         try:
             yield
         except sqlite3.Error as fault:
@@ -102,8 +99,8 @@ class Rows:
             ) from None
 
     def put(self, kind: str, key: str, value: Any, blob: bytes = b"", again: bool = True) -> str:
-        """Write a row; unless `again`, one that is there stays. Returns its digest."""
-        text = json.dumps(value, default=_python)
+        """Unless `again`, a row that is there stays. Returns the digest of what was written."""
+        text = json.dumps(value, default=lambda scalar: scalar.item())  # numpy's
         row = (kind, key, text, blob, digest_of(kind, key, text, blob))
         with self.faults():
             self.file.execute(
@@ -130,7 +127,7 @@ class Rows:
         return None
 
     def keys(self, kind: str) -> list[str]:
-        """The keys of a kind, in the order in which they were written."""
+        """In the order in which they were written."""
         with self.faults():
             return [
                 str(key)
@@ -140,18 +137,11 @@ class Rows:
             ]
 
     def delete(self, kind: str, key: str) -> None:
-        """Delete a row."""
         with self.faults():
             self.file.execute("delete from results where kind = ? and key = ?", [kind, key])
 
     def close(self) -> None:
-        """Close the file."""
         self.file.close()
-
-
-def _python(value: Any) -> Any:
-    """A numpy scalar as Python's."""
-    return value.item()
 
 
 def digest_of(*parts: str | bytes) -> str:

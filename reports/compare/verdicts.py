@@ -4,6 +4,7 @@
 
 - A collision between two samples. A path from sample to sample is taken as straight; a disk that
   had the time to go round the end of a wall, or round the other disk, did not pass through it.
+  What others near them may have added to the speed of two disks counts, unless both flew freely.
 - Energy or overlap of one or two samples only: inside a collision an engine may overlap, and read
   velocity and position of different instants.
 - On a torus, two disks that pass through each other in an interval in which one is set onto the
@@ -260,11 +261,40 @@ class Judge:
                 if distance >= max(scene.radius[disk], scene.radius[other]):
                     continue
                 relative = laws.lengths(v[k : k + 2, other] - v[k : k + 2, disk]).max()
+                flew = self.flies(k, disk) and self.flies(k, other)
+                if not flew and self.disturbed(k, disk, other):
+                    relative = 2 * (self.speed[k] + self.g * self.interval)
                 relative += self.g * self.interval * bool(scene.static[[disk, other]].any())
                 # exactly through the centre is no way round
                 beside = nearest / distance * reach if distance > 1e-6 * reach else None
                 if beside is None or laws.detour(start, end, beside) > relative * self.interval:
                     yield float(t[k + 1]), disk, other
+
+    def flies(self, k: int, disk: int) -> bool:
+        """Whether the velocity at sample k or k + 1 carries a disk from one to the other, within
+        0.1 R: what it meets, it meets at an end, and its path between them is straight."""
+        scene, x, v = self.scenario.scene, self.played.position, self.played.velocity
+        moved, gained = x[k + 1, disk] - x[k, disk], scene.gravity * self.interval
+        for velocity in (v[k, disk], v[k + 1, disk] - gained):
+            # symplectic Euler falls by g dt2 in a step, explicit Euler by none
+            fall = np.linspace(velocity, velocity + gained, 21) * self.interval
+            if laws.lengths(fall - moved).min() <= MOST_OVERLAP * scene.radius[disk]:
+                return True
+        return False
+
+    def disturbed(self, k: int, disk: int, other: int) -> bool:
+        """Whether one of two disks may meet a third, or a wall, after sample k: until k + 1 they
+        may then be faster than at both."""
+        scene, x = self.scenario.scene, self.played.position[k]
+        reach = self.speed[k] * self.interval
+        for i, partner in ((disk, other), (other, disk)):
+            gaps = laws.lengths(laws.nearer_way(x - x[i], scene)) - scene.radius - scene.radius[i]
+            if (np.delete(gaps, [i, partner]) < 2 * reach).any():
+                return True
+            walls = [laws.nearest_on_segment(x[i, None], *wall)[0] - x[i] for wall in scene.walls]
+            if any(laws.lengths(way) - scene.radius[i] < reach for way in walls):
+                return True
+        return False
 
     def overlap(self, pair: Pair) -> Verdict:
         """The overlap of a disk with the others that is farthest above its bound: 0.1 R and what

@@ -29,7 +29,7 @@ from crosscheck2d.scenarios.model import Scenario
 from crosscheck2d.scenarios.no_truth import NoTruth, answered
 from crosscheck2d.scenarios.truth.cache import packed, unpacked
 from crosscheck2d.scenarios.truth.exact import CLOSED_FORM, OracleTruth
-from crosscheck2d.scenarios.truth.oracle.work import TimeLimit
+from crosscheck2d.scenarios.truth.oracle.path import TimeLimit
 from crosscheck2d.scenarios.truth.record import TruthRecord
 
 OK, NONE = "ok", "none"

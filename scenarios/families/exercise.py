@@ -1,5 +1,5 @@
-"""The scenes of the exercise "Physics based simulation": a spaceship among asteroids, and the ship
-alone."""
+"""Disks under thrusts, fixed in the world or in the disk; and the scenes of the exercise "Physics
+based simulation": a spaceship among asteroids, and the ship alone."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy as np
 
 from crosscheck2d.scenarios.families.placing import lay_out, scatter
 from crosscheck2d.scenarios.model import Array, Scenario, Scene, Thrust, Trajectory
-from crosscheck2d.scenarios.truth.closed_forms import world_thrusts
+from crosscheck2d.scenarios.truth.closed_forms import answer, body_thrust, flight, world_thrusts
 from crosscheck2d.scenarios.truth.exact import with_oracle
 
 SOURCE = 'Visual Computing, exercise 11, "Physics based simulation"'
@@ -15,7 +15,7 @@ LOW, HIGH = [-5.0, -3.0], [5.0, 3.0]
 SHIP, SHIP_RADIUS = [-3.5, 0.0], 0.3
 SHIP_MASS = np.pi * SHIP_RADIUS**2 * 5
 SHIP_INERTIA = np.pi / 2 * SHIP_RADIUS**4
-INTERVAL = 0.04
+INTERVAL, SIXTIETH = 0.04, 1 / 60  # s
 LADDER = (4, 10, 20, 40)  # down to the exercise's own step of 0.001 s
 
 # Key down s, key up s, sign: whole numbers of sample intervals, so that in every step a thrust
@@ -25,15 +25,11 @@ TURNS = ((0.60, 1.80, 1), (2.20, 3.40, -1), (4.80, 5.20, -1))  # A, D, D
 
 
 def asteroids(seed: int = 0) -> Scenario:
-    """The ship at rest among twenty asteroids, sampled as in the exercise, but without overlaps."""
     question = Scenario(
-        name="asteroids",
-        asks=(
-            "Do the engines agree on where a ship and twenty asteroids are after 10 s of"
-            " collisions?"
-        ),
-        source=f"{SOURCE}; what overlaps is sampled again",
-        scene=asteroid_field(seed),
+        "asteroids",
+        "Do the engines agree on where a ship and twenty asteroids are after 10 s of collisions?",
+        f"{SOURCE}; what overlaps is sampled again",
+        asteroid_field(seed),
         duration=10.0,
         sample_interval=INTERVAL,
         substeps=LADDER,
@@ -50,26 +46,20 @@ def asteroid_field(seed: int, count: int = 20, restitution: float = 0.9) -> Scen
     position = scatter(rng, LOW, HIGH, radius, first=SHIP)
     velocity = rng.uniform(0.25, 0.5, (count, 2)) * rng.choice([-1.0, 1.0], (count, 2))
     return lay_out(
-        position=position,
-        velocity=np.vstack([[0.0, 0.0], velocity]),
+        position,
+        np.vstack([[0.0, 0.0], velocity]),
+        radius,
+        np.append(SHIP_MASS, 30 * np.pi * size**2),
+        restitution,
         angular_velocity=np.append(0.0, rng.uniform(-0.5, 0.5, count)),
-        radius=radius,
-        mass=np.append(SHIP_MASS, 30 * np.pi * size**2),
         inertia=np.append(SHIP_INERTIA, np.pi / 2 * size**4),
-        restitution=restitution,
         wrap=[LOW, HIGH],
     )
 
 
 def ship_thrust() -> Scenario:
-    """The ship alone, steered by keys held for known times."""
     scene = lay_out(
-        position=[SHIP],
-        velocity=[[0.0, 0.0]],
-        radius=[SHIP_RADIUS],
-        mass=[SHIP_MASS],
-        inertia=[SHIP_INERTIA],
-        restitution=0.9,
+        [SHIP], radius=SHIP_RADIUS, mass=SHIP_MASS, inertia=[SHIP_INERTIA], restitution=0.9
     )
     turns = [Thrust(0, down, up, np.zeros(2), SHIP_INERTIA * sign) for down, up, sign in TURNS]
     thrusts = list(turns)
@@ -78,21 +68,77 @@ def ship_thrust() -> Scenario:
         angle = world_thrusts(scene, turns, np.array([down])).angle[0, 0]
         aim = np.array([np.cos(angle), np.sin(angle)])
         thrusts.append(Thrust(0, down, up, sign * SHIP_MASS * 0.25 * aim))
-
-    def truth(t: Array) -> Trajectory:
-        return world_thrusts(scene, thrusts, t)
-
     return Scenario(
-        name="ship_thrust",
-        asks="Does a steered ship end where its thrusts and turns carry it?",
-        source=f"{SOURCE}: keys W, S, A, D; x0 + v0 t + F t2 / 2m piece by piece",
-        scene=scene,
+        "ship_thrust",
+        "Does a steered ship end where its thrusts and turns carry it?",
+        f"{SOURCE}: keys W, S, A, D; x0 + v0 t + F t2 / 2m piece by piece",
+        scene,
         duration=6.0,
         sample_interval=INTERVAL,
         substeps=LADDER,
         thrusts=thrusts,
-        truth=truth,
+        truth=lambda t: world_thrusts(scene, thrusts, t),
     )
 
 
 EXERCISE = (ship_thrust, asteroids)
+
+
+def spin_under_torque() -> Scenario:
+    scene = lay_out(
+        [[-3.0, 0.0], [3.0, 1.0]],
+        [[0.5, -0.25], [0.0, 0.0]],
+        radius=[0.5, 0.3],
+        mass=[2.0, 0.7],
+        angle=[0.3, 0.0],
+        angular_velocity=[-1.0, 0.0],
+    )
+    # Disk, first and last sample, force N, torque N m: whole intervals, so that every step is under
+    # a thrust from its start to its end or not at all.
+    table = (
+        (0, 0, 240, [0.0, 0.0], 0.125),
+        (0, 30, 90, [0.6, 0.2], 0.0),
+        (0, 60, 150, [-0.4, 0.5], -0.25),
+        (1, 45, 105, [0.1, -0.3], 0.05),
+        (1, 105, 180, [-0.2, 0.1], -0.04),
+    )
+    thrusts = [
+        Thrust(disk, first * SIXTIETH, last * SIXTIETH, np.array(force), torque)
+        for disk, first, last, force, torque in table
+    ]
+    return Scenario(
+        "spin_under_torque",
+        "Do forces move and torques turn a disk as Newton's second law says?",
+        "x0 + v0 t + F t2 / 2m and angle0 + spin0 t + torque t2 / 2I, piece by piece",
+        scene,
+        duration=4.0,
+        thrusts=thrusts,
+        truth=lambda t: world_thrusts(scene, thrusts, t),
+    )
+
+
+def body_frame_thrust() -> Scenario:
+    force, burn = np.array([1.5, 0.5]), 240 * SIXTIETH
+    scene = lay_out(
+        [[-1.0, 0.5]], [0.3, -0.2], radius=0.5, mass=2.0, angle=[0.4], angular_velocity=[1.7]
+    )
+
+    def truth(t: Array) -> Trajectory:
+        burnt, spin = np.minimum(t, burn), scene.angular_velocity[0]
+        moved, gained = body_thrust(burnt, force / scene.mass[0], scene.angle[0], spin)
+        position, velocity = flight(t[:, None], scene.position[0], scene.velocity[0])
+        coast = np.maximum(t - burn, 0)[:, None] * gained
+        return answer(scene, t, ((position + moved + coast)[:, None], (velocity + gained)[:, None]))
+
+    return Scenario(
+        "body_frame_thrust",
+        "Does a jet fixed to a spinning disk drive it around the right curve?",
+        "the integral of exp(i (angle + spin t)), twice",
+        scene,
+        duration=6.0,
+        thrusts=[Thrust(0, 0.0, burn, force, frame="body")],
+        truth=truth,
+    )
+
+
+THRUSTS = (spin_under_torque, body_frame_thrust)

@@ -34,10 +34,10 @@ def oblique_impacts(dt: float, lead: float) -> Scenario:
     along, down = SPEED * np.sin(angle), SPEED * np.cos(angle)
     mass = np.full(n, DENSITY * 4 / 3 * np.pi * RADIUS**3)
     scene = lay_out(
-        position=np.stack([20 * RADIUS * np.arange(n), RADIUS + down * wait], axis=1),
-        velocity=np.stack([along, -down], axis=1),
-        radius=np.full(n, RADIUS),
-        mass=mass,
+        np.stack([20 * RADIUS * np.arange(n), RADIUS + down * wait], axis=1),
+        np.stack([along, -down], axis=1),
+        RADIUS,
+        mass,
         inertia=mass * RADIUS**2 / SPHERE,
         walls=[[[-1.0, 0.0], [2.0, 0.0]]],
         restitution=RESTITUTION,
@@ -52,10 +52,10 @@ def oblique_impacts(dt: float, lead: float) -> Scenario:
         return turning_answer(scene, t, legs.at(t), [(wait, i, -1, kick[i]) for i in range(n)])
 
     return Scenario(
-        name="oblique_impacts",
-        asks="Does an oblique impact turn and brake a 5 mm sphere as the experiment says?",
-        source=f"Kharaz, Gorham & Salman, Powder Technology 120, 281, 2001; {IMPACT}",
-        scene=scene,
+        "oblique_impacts",
+        "Does an oblique impact turn and brake a 5 mm sphere as the experiment says?",
+        f"Kharaz, Gorham & Salman, Powder Technology 120, 281, 2001; {IMPACT}",
+        scene,
         duration=32 * dt,
         sample_interval=dt,
         substeps=(1,),

@@ -24,8 +24,7 @@ ROLL = "sliding at mu g, then rolling (any textbook of mechanics)"
 
 
 def friction_bounce(restitution: float, friction: float) -> Scenario:
-    """Six disks fall onto the floor obliquely: some slip during the whole collision, some stick,
-    one is at the limit between the two."""
+    """Some of six disks slip during the whole collision, some stick, one is at the limit."""
     e, mu, radius, fall = restitution, friction, 0.25, 4.0
     # At the limit friction just ends the slip of the rim, which is 3 mu (1 + e) v_n for a solid
     # disk.
@@ -57,14 +56,13 @@ def bounce_on_floor(
     with a speed along it, one downwards, m/s, and a spin, rad/s; half a second without gravity."""
     height, n = 0.83, len(along)
     scene = lay_out(
-        position=np.stack([apart * np.arange(n) - 5, np.full(n, radius + height)], axis=-1),
-        velocity=np.stack([along, np.full(n, -fall)], axis=-1),
-        angular_velocity=spin,
-        radius=np.full(n, radius),
-        mass=np.ones(n),
-        walls=[[[-10, 0], [12, 0]]],
+        np.stack([apart * np.arange(n) - 5, np.full(n, radius + height)], axis=-1),
+        np.stack([along, np.full(n, -fall)], axis=-1),
+        radius,
         restitution=restitution,
         friction=friction,
+        angular_velocity=spin,
+        walls=[[[-10, 0], [12, 0]]],
     )
 
     def truth(t: Array) -> Trajectory:
@@ -74,26 +72,17 @@ def bounce_on_floor(
         collisions = [(float(legs.start[1]), i, -1, (1 + restitution) * fall) for i in range(n)]
         return turning_answer(scene, t, legs.at(t), collisions)
 
-    return Scenario(
-        name=name,
-        asks=asks,
-        source=IMPACT,
-        scene=scene,
-        duration=0.5,
-        sample_interval=1 / 60,
-        truth=truth,
-    )
+    return Scenario(name, asks, IMPACT, scene, duration=0.5, truth=truth)
 
 
 def spinning_disks_meet() -> Scenario:
     """Three pairs: slow spins that stick, fast ones that slip, and unequal disks off centre."""
-    r = np.array([0.25, 0.25, 0.25, 0.25, 0.3, 0.2])
     scene = lay_out(
-        position=[[-1.26, -3], [1.3, -3], [-1.23, 0], [1.3, 0], [-1.2, 3], [1.3, 3.2]],
-        velocity=[[1.1, 0], [-0.9, 0], [1.1, 0], [-0.9, 0], [1.2, 0.1], [-0.7, 0.05]],
-        angular_velocity=[4.0, 4.0, 20.0, 25.0, -12.0, 3.0],
-        radius=r,
+        [[-1.26, -3], [1.3, -3], [-1.23, 0], [1.3, 0], [-1.2, 3], [1.3, 3.2]],
+        [[1.1, 0], [-0.9, 0], [1.1, 0], [-0.9, 0], [1.2, 0.1], [-0.7, 0.05]],
+        radius=[0.25, 0.25, 0.25, 0.25, 0.3, 0.2],
         mass=[1.0, 1.0, 1.0, 1.0, 2.0, 0.5],
+        angular_velocity=[4.0, 4.0, 20.0, 25.0, -12.0, 3.0],
         restitution=0.8,
         friction=0.2,
     )
@@ -108,29 +97,23 @@ def spinning_disks_meet() -> Scenario:
         return turning_answer(scene, t, (place, rate), collisions)
 
     return Scenario(
-        name="spinning_disks_meet",
-        asks="Do two spinning disks exchange spin and speed in a collision, slipping or sticking?",
-        source=IMPACT,
-        scene=scene,
+        "spinning_disks_meet",
+        "Do two spinning disks exchange spin and speed in a collision, slipping or sticking?",
+        IMPACT,
+        scene,
         duration=3.0,
-        sample_interval=1 / 60,
         truth=truth,
     )
 
 
 def spin_to_flight_and_back() -> Scenario:
-    """A spinning disk falls straight: the floor turns spin into sideways motion, the ceiling turns
-    that into opposite spin."""
     radius, gap = 0.25, 1.5
     scene = lay_out(
-        position=[[0.0, radius + gap / 2]],
-        velocity=[[0.0, -2.17]],
-        angular_velocity=[40.0],
-        radius=[radius],
-        mass=[1.0],
-        walls=[[[-10, 0], [10, 0]], [[-10, 2 * radius + gap], [10, 2 * radius + gap]]],
-        restitution=1.0,
+        [[0.0, radius + gap / 2]],
+        [0.0, -2.17],
         friction=1.0,
+        angular_velocity=[40.0],
+        walls=[[[-10, 0], [10, 0]], [[-10, 2 * radius + gap], [10, 2 * radius + gap]]],
     )
 
     def truth(t: Array) -> Trajectory:
@@ -142,12 +125,11 @@ def spin_to_flight_and_back() -> Scenario:
         return turning_answer(scene, t, (place[:, None], rate[:, None]), collisions)
 
     return Scenario(
-        name="spin_to_flight_and_back",
-        asks="Does the spin of a disk become flight at the floor, and spin again at the ceiling?",
-        source=IMPACT,
-        scene=scene,
+        "spin_to_flight_and_back",
+        "Does the spin of a disk become flight at the floor, and spin again at the ceiling?",
+        IMPACT,
+        scene,
         duration=4.0,
-        sample_interval=1 / 60,
         truth=truth,
     )
 
@@ -159,15 +141,13 @@ def slide_on_floor(
     rad/s."""
     radius = 0.25
     scene = lay_out(
-        position=[[-2.0, radius]],
-        velocity=[[speed, 0.0]],
-        angular_velocity=[spin],
-        radius=[radius],
-        mass=[1.0],
-        walls=FLOOR,
-        gravity=[0.0, -G],
+        [[-2.0, radius]],
+        [speed, 0.0],
         restitution=0.0,
         friction=friction,
+        angular_velocity=[spin],
+        walls=FLOOR,
+        gravity=[0.0, -G],
     )
 
     def truth(t: Array) -> Trajectory:
@@ -177,11 +157,10 @@ def slide_on_floor(
         place[..., :2] += scene.position
         return turning_answer(scene, t, (place, moves), [(0.0, 0, -1, 0.0)])
 
-    return Scenario(name, asks, ROLL, scene, duration, 1 / 60, truth=truth)
+    return Scenario(name, asks, ROLL, scene, duration, truth=truth)
 
 
 def slip_to_roll() -> Scenario:
-    """A disk that slides without spin begins to roll, at 2/3 of its speed."""
     return slide_on_floor(
         "slip_to_roll",
         "Does a disk that slides begin to roll at 2/3 of its speed, after v / (3 mu g)?",
@@ -192,7 +171,6 @@ def slip_to_roll() -> Scenario:
 
 
 def backspin_returns() -> Scenario:
-    """A disk with enough back spin to return at its start speed."""
     return slide_on_floor(
         "backspin_returns",
         "Does a disk with back spin stop, come back and roll at the right time?",
@@ -214,8 +192,7 @@ SLOPES = (
 
 
 def roll_or_slide() -> Scenario:
-    """Five disks on slopes of 5/12 to 24/7: with friction 1/4 they roll up to 3/4, and slide from
-    there on."""
+    """On slopes of 5/12 to 24/7: with friction 1/4 they roll up to 3/4, and slide from there on."""
     friction, spacing = 0.25, 7.0
     sides = np.array([row[:3] for row in SLOPES], float)
     radius = np.array([c * scale for _, _, c, scale in SLOPES])
@@ -226,11 +203,9 @@ def roll_or_slide() -> Scenario:
         np.log2(sides[:, 2:] / 4)
     )
     scene = lay_out(
-        position=np.stack([foot, 0 * foot], axis=-1)
+        np.stack([foot, 0 * foot], axis=-1)
         + np.array([[a * scale, b * scale] for a, b, _, scale in SLOPES]),
-        velocity=np.zeros((len(foot), 2)),
         radius=radius,
-        mass=np.ones(len(foot)),
         walls=np.stack([[foot, 0 * foot] - reach.T, [foot, 0 * foot] + reach.T]).transpose(2, 0, 1),
         gravity=[0.0, -G],
         restitution=0.0,
@@ -250,43 +225,38 @@ def roll_or_slide() -> Scenario:
         return turning_answer(scene, t, (place, moves), collisions)
 
     return Scenario(
-        name="roll_or_slide",
-        asks="Does a disk on a slope roll up to tan(angle) = 3 mu, and slide on a steeper one?",
-        source="rolling needs tan(angle) <= mu (1 + m r2 / I); a = g sin / (1 + I / (m r2)), else g"
-        " (sin - mu cos)",
-        scene=scene,
+        "roll_or_slide",
+        "Does a disk on a slope roll up to tan(angle) = 3 mu, and slide on a steeper one?",
+        "rolling needs tan(angle) <= mu (1 + m r2 / I); a = g sin / (1 + I / (m r2)), else g (sin -"
+        " mu cos)",
+        scene,
         duration=0.75,
-        sample_interval=1 / 60,
         truth=truth,
     )
 
 
 def frictional_box(seed: int = 0) -> Scenario:
-    """Twelve unequal spinning disks in a box, with friction 0.3 and e = 0.9."""
     rng = np.random.default_rng(seed)
     radius = rng.uniform(0.15, 0.35, 12)
     scene = lay_out(
-        position=scatter(rng, [-1.6, -1.6], [1.6, 1.6], radius),
-        velocity=rng.normal(0, 1.5, (12, 2)),
-        angular_velocity=rng.normal(0, 10, 12),
-        radius=radius,
-        mass=4 * radius**2,
-        walls=box([-2, -2], [2, 2]),
+        scatter(rng, [-1.6, -1.6], [1.6, 1.6], radius),
+        rng.normal(0, 1.5, (12, 2)),
+        radius,
+        4 * radius**2,
         restitution=0.9,
         friction=0.3,
+        angular_velocity=rng.normal(0, 10, 12),
+        walls=box([-2, -2], [2, 2]),
     )
-    return with_oracle(
-        Scenario(
-            name="frictional_box",
-            asks="Do disks in a box with friction lose energy, and never gain any?",
-            source="in many digits up to its horizon; later only what is conserved, and the loss",
-            scene=scene,
-            duration=4.0,
-            sample_interval=1 / 60,
-            without_truth="not asked for yet",
-            seed=seed,
-        )
+    question = Scenario(
+        "frictional_box",
+        "Do disks in a box with friction lose energy, and never gain any?",
+        "in many digits up to its horizon; later only what is conserved, and the loss",
+        scene,
+        duration=4.0,
+        seed=seed,
     )
+    return with_oracle(question)
 
 
 def start_of(scene: Scene) -> tuple[Array, Array]:
@@ -301,14 +271,9 @@ def turning_answer(
     scene: Scene, t: Array, motion: tuple[Array, Array], collisions: list[Collision]
 ) -> Trajectory:
     """The `Trajectory` of a motion (k, n, 3) of x, y and angle, and its rate."""
-    (place, rate) = motion
-    return answer(
-        scene,
-        t,
-        (place[..., :2], rate[..., :2]),
-        collisions,
-        (place[..., 2], rate[..., 2]),
-    )
+    place, rate = motion
+    turning = place[..., 2], rate[..., 2]
+    return answer(scene, t, (place[..., :2], rate[..., :2]), collisions, turning)
 
 
 FRICTION: tuple[Callable[..., Scenario], ...] = (

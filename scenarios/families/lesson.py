@@ -18,14 +18,12 @@ SOURCE = 'the lesson "Simple body dynamics"'
 def free_fall(spin: float = 2.0) -> Scenario:
     """One disk, thrown: with a spin (rad/s), or without for engines that model no rotation."""
     scene = lay_out(
-        position=[[-4.0, 1.0]],
-        velocity=[[3.0, 7.0]],
+        [[-4.0, 1.0]],
+        [3.0, 7.0],
+        mass=2.0,
         angle=[0.5],
         angular_velocity=[spin],
-        radius=[0.25],
-        mass=[2.0],
         gravity=[0.0, -9.81],
-        restitution=1.0,
     )
 
     def truth(t: Array) -> Trajectory:
@@ -34,27 +32,22 @@ def free_fall(spin: float = 2.0) -> Scenario:
         )
 
     return Scenario(
-        name="free_fall" if spin else "free_fall_without_spin",
-        asks="How far off the parabola does a thrown disk fly"
+        "free_fall" if spin else "free_fall_without_spin",
+        "How far off the parabola does a thrown disk fly"
         f"{'' if spin else ', if it does not turn'}?",
-        source=f"{SOURCE}, part 3; x + v t + g t2 / 2",
-        scene=scene,
+        f"{SOURCE}, part 3; x + v t + g t2 / 2",
+        scene,
         duration=1.5,
-        sample_interval=1 / 60,
         truth=truth,
     )
 
 
 def ping_pong() -> Scenario:
-    """One disk between y = 1 and y = 11 at speed 1: a period of 20 s."""
     radius, low, high = 0.25, 1.0, 11.0
     scene = lay_out(
-        position=[[0.0, 6.3213]],
-        velocity=[[0.0, 1.0]],
-        radius=[radius],
-        mass=[1.0],
+        [[0.0, 6.3213]],
+        [0.0, 1.0],
         walls=[[[-5, low - radius], [5, low - radius]], [[-5, high + radius], [5, high + radius]]],
-        restitution=1.0,
     )
 
     def truth(t: Array) -> Trajectory:
@@ -66,10 +59,10 @@ def ping_pong() -> Scenario:
         return answer(scene, t, (position, velocity), legs.wall_collisions(0, (1, 0), 1.0, 1.0))
 
     return Scenario(
-        name="ping_pong",
-        asks="Does a disk that ping-pongs between two walls keep its speed and its period of 20 s?",
-        source=f"{SOURCE}, part 2",
-        scene=scene,
+        "ping_pong",
+        "Does a disk that ping-pongs between two walls keep its speed and its period of 20 s?",
+        f"{SOURCE}, part 2",
+        scene,
         duration=40.0,
         sample_interval=1 / 30,
         truth=truth,
@@ -77,29 +70,23 @@ def ping_pong() -> Scenario:
 
 
 def falling_box(seed: int = 0) -> Scenario:
-    """Thirty small disks at random places in a unit box, falling."""
     rng = np.random.default_rng(seed)
     radius = np.full(30, 0.03)
-    position = scatter(rng, [0.03, 0.03], [0.97, 0.97], radius)
     scene = lay_out(
-        position=position,
-        velocity=rng.uniform(-1, 1, (30, 2)),
-        radius=radius,
-        mass=np.ones(30),
+        scatter(rng, [0.03, 0.03], [0.97, 0.97], radius),
+        rng.uniform(-1, 1, (30, 2)),
+        radius,
+        restitution=0.95,
         walls=box([0, 0], [1, 1]),
         gravity=[0.0, -9.81],
-        restitution=0.95,
     )
     question = Scenario(
-        name="falling_box",
-        asks=(
-            "Do thirty disks that fall in a box stay inside without overlap, and lose energy only"
-            " by collisions?"
-        ),
-        source=f"{SOURCE}, parts 3 and 4, in two dimensions",
-        scene=scene,
+        "falling_box",
+        "Do thirty disks that fall in a box stay inside without overlap, and lose energy only by"
+        " collisions?",
+        f"{SOURCE}, parts 3 and 4, in two dimensions",
+        scene,
         duration=2.0,
-        sample_interval=1 / 60,
         seed=seed,
     )
     return with_oracle(question)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from crosscheck2d.scenarios.families.placing import lay_out, tag
 from crosscheck2d.scenarios.model import Array, Scenario, Trajectory
@@ -19,31 +19,16 @@ SOURCE = (
 RESTITUTIONS = (0.0, 0.5, 0.9, 1.0)
 
 
-def _pairs(
-    name: str,
-    asks: str,
-    position: ArrayLike,
-    velocity: ArrayLike,
-    mass: ArrayLike,
-    restitution: float,
-    duration: float,
-    radius: float = 0.25,
-    spin: ArrayLike | None = None,
-) -> Scenario:
+def _pairs(name: str, asks: str, duration: float = 4.0, **disks: Any) -> Scenario:
     """Disks 0 and 1, 2 and 3, ... meet; no pair comes near another."""
-    x, v, m = (np.asarray(a, float) for a in (position, velocity, mass))
-    r = np.full(len(m), radius)
-    spins = np.zeros(len(m)) if spin is None else np.asarray(spin, float)
-    scene = lay_out(
-        position=x, velocity=v, radius=r, mass=m, angular_velocity=spins, restitution=restitution
-    )
+    scene = lay_out(**disks)
 
     def truth(t: Array) -> Trajectory:
-        motions: list[Motion] = []
-        collisions: list[Collision] = []
-        for i in range(0, len(m), 2):
+        motions, collisions = list[Motion](), list[Collision]()
+        x, v, r, m = scene.position, scene.velocity, scene.radius, scene.mass
+        for i in range(0, scene.n, 2):
             two = slice(i, i + 2)
-            legs, impulse = pair(x[two], v[two], r[two], m[two], restitution)
+            legs, impulse = pair(x[two], v[two], r[two], m[two], scene.restitution)
             motions.append(legs.at(t))
             collisions += [
                 (float(at), i, i + 1, float(kick)) for at, kick in zip(legs.start[1:], impulse)
@@ -51,24 +36,20 @@ def _pairs(
         position, velocity = (np.concatenate(part, axis=1) for part in zip(*motions))
         return answer(scene, t, (position, velocity), collisions)
 
-    return Scenario(name, asks, SOURCE, scene, duration, 1 / 60, truth=truth)
+    return Scenario(name, asks, SOURCE, scene, duration, truth=truth)
 
 
 def head_on_equal(restitution: float) -> Scenario:
-    """Two equal disks, both moving, on one line."""
     return _pairs(
         f"head_on_equal_{tag('e', restitution)}",
         f"Do two equal disks separate after a head-on collision as e = {restitution:g} says?",
         position=[[-1.7, 0], [1.9, 0]],
         velocity=[[1.1, 0], [-0.7, 0]],
-        mass=[1, 1],
         restitution=restitution,
-        duration=4.0,
     )
 
 
 def head_on_unequal(restitution: float) -> Scenario:
-    """A light disk and one of seven times its mass, both moving, on one line."""
     return _pairs(
         f"head_on_unequal_{tag('e', restitution)}",
         f"Do a light and a heavy disk share momentum in a head-on collision as e = {restitution:g}"
@@ -77,13 +58,10 @@ def head_on_unequal(restitution: float) -> Scenario:
         velocity=[[1.3, 0], [-0.6, 0]],
         mass=[1, 7],
         restitution=restitution,
-        duration=4.0,
     )
 
 
 def oblique(restitution: float) -> Scenario:
-    """Two spinning disks that meet off centre: without friction the collision leaves the spin
-    alone."""
     return _pairs(
         f"oblique_{tag('e', restitution)}",
         f"Do two disks that meet off centre separate at the angles of e = {restitution:g}, their"
@@ -91,28 +69,25 @@ def oblique(restitution: float) -> Scenario:
         position=[[-1.8, -0.1], [1.7, 0.2]],
         velocity=[[1.2, 0.1], [-0.7, 0.05]],
         mass=[1, 2],
-        spin=[1.5, -0.5],
+        angular_velocity=[1.5, -0.5],
         restitution=restitution,
-        duration=4.0,
     )
 
 
 def off_centre_without_spin() -> Scenario:
-    """Two disks that meet at 37 degrees off the line of centres, for engines without rotation: one
-    that exchanges x and y of the velocities, without a normal, is right on a line."""
+    """At 37 degrees off the line of centres, for engines without rotation: one that exchanges x and
+    y of the velocities, without a normal, is right on a line."""
     return _pairs(
         "off_centre_without_spin",
         "Do two disks that meet off centre change their velocities along the line of centres only?",
+        duration=2.0,
         position=[[-1.013, 0.3], [0.5, 0.0]],
         velocity=[[2.0, 0.0], [0.0, 0.0]],
         mass=[1, 2],
-        restitution=1.0,
-        duration=2.0,
     )
 
 
 def mass_ratios() -> Scenario:
-    """Seven lanes, in each a disk of mass 1 and one of mass 1, 10, ... 1e6."""
     lanes = np.arange(7)
     y = 2.0 * (lanes - 3)
     # The distance grows from lane to lane, so that the seven collisions are at different phases of
@@ -125,38 +100,28 @@ def mass_ratios() -> Scenario:
         position=np.stack([light, heavy], axis=1).reshape(-1, 2),
         velocity=np.tile([[0.5, 0], [-1, 0]], (7, 1)),
         mass=np.stack([np.ones(7), 10.0**lanes], axis=-1).ravel(),
-        restitution=1.0,
-        duration=4.0,
     )
 
 
 def slow_collision() -> Scenario:
-    """A collision at 0.5 m/s, below the threshold under which some engines make every collision
-    inelastic."""
+    """Below the threshold under which some engines make every collision inelastic."""
     return _pairs(
         "slow_collision",
         "Is a collision at 0.5 m/s as elastic as a fast one, or is it below a threshold?",
         position=[[-0.63, 0], [0.583, 0]],
         velocity=[[0.37, 0], [-0.13, 0]],
-        mass=[1, 1],
         restitution=0.9,
-        duration=4.0,
     )
 
 
 def near_miss() -> Scenario:
-    """A disk that passes a resting one at 1.005 times the touching distance, fast."""
-    radius = 0.25
     return _pairs(
         "near_miss",
         "Which engine reports a spurious collision when a fast disk passes another at 1.005 times"
         " the touching distance?",
-        position=[[-6, 1.005 * 2 * radius], [0.03, 0]],
-        velocity=[[12, 0], [0, 0]],  # 0.2 radii per step of 1/240 s
-        mass=[1, 1],
-        restitution=1.0,
         duration=1.0,
-        radius=radius,
+        position=[[-6, 1.005 * 2 * 0.25], [0.03, 0]],
+        velocity=[[12, 0], [0, 0]],  # 0.2 radii per step of 1/240 s
     )
 
 

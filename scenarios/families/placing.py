@@ -11,9 +11,25 @@ from numpy.typing import ArrayLike
 from crosscheck2d.scenarios.model import Array, Scene
 
 
-def lay_out(**fields: Any) -> Scene:
-    """The `Scene` of these fields, given as nested lists or arrays. Raises what `Scene` raises."""
-    return Scene(**fields)
+def lay_out(
+    position: ArrayLike,
+    velocity: ArrayLike = (0.0, 0.0),
+    radius: ArrayLike = 0.25,
+    mass: ArrayLike = 1.0,
+    restitution: float = 1.0,
+    **fields: Any,
+) -> Scene:
+    """The `Scene` of these disks; one velocity, radius or mass is that of all of them. Raises what
+    `Scene` raises."""
+    x, v, r, m = (np.asarray(value, float) for value in (position, velocity, radius, mass))
+    return Scene(
+        position=x,
+        velocity=v if v.ndim > 1 else np.tile(v, (len(x), 1)),
+        radius=r if r.ndim else np.full(len(x), r),
+        mass=m if m.ndim else np.full(len(x), m),
+        restitution=restitution,
+        **fields,
+    )
 
 
 def tag(letter: str, value: float) -> str:

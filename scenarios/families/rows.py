@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from crosscheck2d.scenarios.families.placing import lay_out
-from crosscheck2d.scenarios.model import Array, Scenario, Scene, Trajectory
+from crosscheck2d.scenarios.model import Array, Scenario, Trajectory
 from crosscheck2d.scenarios.truth.closed_forms import Motion, answer
 from crosscheck2d.scenarios.truth.exact import with_oracle
 from crosscheck2d.scenarios.truth.lines import galperin, galperin_collisions, row, row_collisions
@@ -22,7 +22,6 @@ def _on_line(x: Array, v: Array) -> Motion:
 
 
 def line_gas() -> Scenario:
-    """Fifteen equal disks between two walls."""
     n, radius, length = 15, 0.25, 12.0
     # Irregular without random numbers; plain multiples i sqrt(2) would cause simultaneous
     # collisions.
@@ -34,27 +33,18 @@ def line_gas() -> Scenario:
         + radius
         + 2 * radius * np.arange(n)
     )
-    position, velocity = _on_line(x, v)
-    scene = lay_out(
-        position=position,
-        velocity=velocity,
-        radius=np.full(n, radius),
-        mass=np.ones(n),
-        walls=[[[0, -1], [0, 1]], [[length, -1], [length, 1]]],
-        restitution=1.0,
-    )
+    scene = lay_out(*_on_line(x, v), walls=[[[0, -1], [0, 1]], [[length, -1], [length, 1]]])
 
     def truth(t: Array) -> Trajectory:
         collisions = row_collisions(x, v, radius, length, 1.0, t[-1])
         return answer(scene, t, _on_line(*row(x, v, radius, length, t)), collisions)
 
     return Scenario(
-        name="line_gas",
-        asks="How does the error grow over hundreds of collisions where there is no chaos?",
-        source="Tonks, Phys. Rev. 50, 955 (1936); Jepsen, J. Math. Phys. 6, 405 (1965)",
-        scene=scene,
+        "line_gas",
+        "How does the error grow over hundreds of collisions where there is no chaos?",
+        "Tonks, Phys. Rev. 50, 955 (1936); Jepsen, J. Math. Phys. 6, 405 (1965)",
+        scene,
         duration=9.15,  # 278 collisions
-        sample_interval=1 / 60,
         truth=truth,
     )
 
@@ -65,88 +55,61 @@ def counting_pi(
     """A wall, a light disk and one 100^k times as heavy, whose number of collisions has the digits
     of pi."""
     radius, speed = np.array([0.25, 0.5]), 0.25
-    mass = np.array([1.0, ratio])
-    gap = np.array([1.0, 1.4246])
+    mass, gap = np.array([1.0, ratio]), np.array([1.0, 1.4246])
     # From free room to centres: the light disk's width is in front of the heavy one.
     shift = np.array([radius[0], 2 * radius[0] + radius[1]])
-    position, velocity = _on_line(gap + shift, np.array([0.0, -speed]))
-    scene = lay_out(
-        position=position,
-        velocity=velocity,
-        radius=radius,
-        mass=mass,
-        walls=[[[0, -2], [0, 2]]],
-        restitution=1.0,
-    )
+    start = _on_line(gap + shift, np.array([0.0, -speed]))
+    scene = lay_out(*start, radius, mass, walls=[[[0, -2], [0, 2]]])
 
     def truth(t: Array) -> Trajectory:
         room, rate = galperin(gap, speed, mass, t)
+        motion, all_collisions = _on_line(room + shift, rate), galperin_collisions(gap, speed, mass)
         # The unfolding angle, up to pi, is rounded; its lever is the heavy disk's weighted
         # distance.
-        bound = (
-            4 * EPS * float(np.sqrt(mass[1] / mass[0])) * float(np.abs(gap[1] - speed * t).max())
-        )
-        return answer(
-            scene,
-            t,
-            _on_line(room + shift, rate),
-            galperin_collisions(gap, speed, mass),
-            error_bound=bound,
-        )
+        lever = float(np.sqrt(mass[1] / mass[0])) * float(np.abs(gap[1] - speed * t).max())
+        return answer(scene, t, motion, all_collisions, error_bound=4 * EPS * lever)
 
     return Scenario(
-        name=f"galperin_{collisions}",
-        asks=f"Do a wall, a light disk and a heavy one collide exactly {collisions} times?",
-        source="Galperin, Playing pool with pi, Regul. Chaotic Dyn. 8, 375 (2003)",
-        scene=scene,
-        duration=duration,
-        sample_interval=1 / 60,
+        f"galperin_{collisions}",
+        f"Do a wall, a light disk and a heavy one collide exactly {collisions} times?",
+        "Galperin, Playing pool with pi, Regul. Chaotic Dyn. 8, 375 (2003)",
+        scene,
+        duration,
         substeps=ladder,
         truth=truth,
     )
 
 
-def _cradle(position: Array) -> Scene:
-    """Five equal disks, e = 1, of which the first two move in."""
-    n = len(position)
-    x, v = _on_line(position, np.array([1.0, 1.0, 0.0, 0.0, 0.0]))
-    return lay_out(
-        position=x, velocity=v, radius=np.full(n, 0.25), mass=np.ones(n), restitution=1.0
-    )
+IN_CRADLE = np.array([1.0, 1.0, 0.0, 0.0, 0.0])  # m/s: two of five disks move in
 
 
 def cradle_with_gaps() -> Scenario:
-    """Two disks move in, two move out, one collision after the other."""
-    x = np.array([-2.355, -1.8447, 0.0, 0.5169, 1.0317])
-    scene = _cradle(x)
+    x, v = np.array([-2.355, -1.8447, 0.0, 0.5169, 1.0317]), IN_CRADLE
+    scene = lay_out(*_on_line(x, v))
 
     def truth(t: Array) -> Trajectory:
-        v = scene.velocity[:, 0]
         collisions = row_collisions(x, v, 0.25, np.inf, 1.0, t[-1])
         return answer(scene, t, _on_line(*row(x, v, 0.25, np.inf, t)), collisions)
 
     return Scenario(
-        name="cradle_with_gaps",
-        asks=(
-            "Do two disks leave a cradle when two come in, if a centimetre lies between its disks?"
-        ),
-        source="equal masses swap velocities at e = 1: they stay sorted",
-        scene=scene,
+        "cradle_with_gaps",
+        "Do two disks leave a cradle when two come in, if a centimetre lies between its disks?",
+        "equal masses swap velocities at e = 1: they stay sorted",
+        scene,
         duration=4.0,
-        sample_interval=1 / 60,
         truth=truth,
     )
 
 
 def cradle_touching() -> Scenario:
-    """The same cradle without gaps: binary fractions, so that its disks touch exactly."""
+    # Binary fractions, so that the disks touch exactly.
+    x = np.array([-2.2587890625, -1.7587890625, 0.0, 0.5, 1.0])
     question = Scenario(
-        name="cradle_touching",
-        asks="Do two disks leave a cradle when two come in, if its disks touch?",
-        source="the limit of small gaps, which is the same in whatever order the collisions come",
-        scene=_cradle(np.array([-2.2587890625, -1.7587890625, 0.0, 0.5, 1.0])),
+        "cradle_touching",
+        "Do two disks leave a cradle when two come in, if its disks touch?",
+        "the limit of small gaps, which is the same in whatever order the collisions come",
+        lay_out(*_on_line(x, IN_CRADLE)),
         duration=4.0,
-        sample_interval=1 / 60,
     )
     return with_oracle(question)
 
@@ -155,16 +118,14 @@ def two_disks_and_a_wall() -> Scenario:
     """A disk, a resting one and a wall, 1 cm apart each, so that three collisions follow within a
     step."""
     question = Scenario(
-        name="two_disks_and_a_wall",
-        asks="Do two disks that meet a wall and each other within one step keep their energy?",
-        source="keenon/nimblephysics#143, where the energy doubles; collisions moved off the steps",
-        scene=lay_out(
-            position=[[0.7786, 0.0], [0.9897, 0.0]],
-            velocity=[[2.0, 0.0], [0.0, 0.0]],
-            radius=[0.1, 0.1],
-            mass=[1.0, 1.0],
+        "two_disks_and_a_wall",
+        "Do two disks that meet a wall and each other within one step keep their energy?",
+        "keenon/nimblephysics#143, where the energy doubles; collisions moved off the steps",
+        lay_out(
+            [[0.7786, 0.0], [0.9897, 0.0]],
+            [[2.0, 0.0], [0.0, 0.0]],
+            radius=0.1,
             walls=[[[1.1, -1.0], [1.1, 1.0]]],
-            restitution=1.0,
         ),
         duration=1.0,
         sample_interval=0.04,  # so that two of the collisions share the middle step too

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from crosscheck2d.scenarios.families.placing import box, lay_out
-from crosscheck2d.scenarios.model import Array, Scenario, Scene, Trajectory
+from crosscheck2d.scenarios.model import Array, Scenario, Trajectory
 from crosscheck2d.scenarios.truth.closed_forms import answer, at_rest, bouncing, flight, stacked
 from crosscheck2d.scenarios.truth.exact import with_oracle
 
@@ -36,36 +37,30 @@ def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
-def posed(asks: str, scene: Scene, duration: float) -> Scenario:
-    """The scenario with the oracle as its truth, cut to whole samples; `tuning` sets its name."""
-    samples = max(round(duration / SAMPLE_INTERVAL), 4)
-    source = "sampled for crosscheck tune"
-    question = Scenario(
-        "unnamed", asks, source, scene, samples * SAMPLE_INTERVAL, SAMPLE_INTERVAL, substeps=LADDER
-    )
-    return with_oracle(question)
+def posed(asks: str, duration: float, **disks: Any) -> Scenario:
+    """The scenario with the oracle as its truth, cut to whole samples; `one_of` sets its name."""
+    duration = max(round(duration / SAMPLE_INTERVAL), 4) * SAMPLE_INTERVAL
+    source, scene = "sampled for crosscheck tune", lay_out(**disks)
+    return with_oracle(Scenario("unnamed", asks, source, scene, duration, substeps=LADDER))
 
 
 def one_restitution(rng: np.random.Generator) -> float:
-    """1 in half of the scenes, else a random value."""
     return ELASTIC if rng.random() < 0.5 else float(rng.uniform(*INELASTIC))
 
 
 def flight_alone(rng: np.random.Generator, r: float, v: float) -> Scenario:
-    """One disk, thrown."""
-    scene = lay_out(
+    return posed(
+        "How far from its parabola is a thrown disk?",
+        1.0,
         position=[[0.0, 0.0]],
         velocity=[v * r * rng.normal(size=2)],
-        radius=[r],
-        mass=[1.0],
+        radius=r,
         gravity=[0, -v * r],
-        restitution=1.0,
     )
-    return posed("How far from its parabola is a thrown disk?", scene, 1.0)
 
 
 def pairs(
-    rng: np.random.Generator, radius: Array, speed: float, offset: Array, duration: float, asks: str
+    asks: str, rng: np.random.Generator, radius: Array, speed: float, offset: Array, duration: float
 ) -> Scenario:
     """Pairs of disks with these two radii in adjacent lanes; pair k passes at offset[k] touching
     distances.
@@ -79,7 +74,9 @@ def pairs(
     apart = np.outer(ahead, along) + np.outer(touch * offset, across)
     lane = np.outer(LANE * touch * (np.arange(n) - n // 2), across)
     drift = np.outer(0.1 * speed * rng.normal(size=n), along)
-    scene = lay_out(
+    return posed(
+        asks,
+        duration,
         position=np.stack([lane - apart / 2, lane + apart / 2], axis=1).reshape(-1, 2),
         velocity=np.stack([drift + speed / 2 * along, drift - speed / 2 * along], axis=1).reshape(
             -1, 2
@@ -88,51 +85,29 @@ def pairs(
         mass=10 ** rng.uniform(-1, 1, 2 * n),
         restitution=one_restitution(rng),
     )
-    return posed(asks, scene, duration)
 
 
 def head_on(rng: np.random.Generator, r: float, v: float) -> Scenario:
-    """Two disks that collide along the line of their centres."""
-    return pairs(
-        rng,
-        unlike(rng, r),
-        v * r,
-        np.zeros(1),
-        1.0,
-        "How far off are two disks after they collided head-on?",
-    )
+    asks = "How far off are two disks after they collided head-on?"
+    return pairs(asks, rng, unlike(rng, r), v * r, np.zeros(1), 1.0)
 
 
 def oblique(rng: np.random.Generator, r: float, v: float) -> Scenario:
-    """Two disks that collide off centre."""
     offset = rng.uniform(0.2, 0.9, 1)
-    return pairs(
-        rng,
-        unlike(rng, r),
-        v * r,
-        offset,
-        1.0,
-        "How far off are two disks after an oblique collision?",
-    )
+    asks = "How far off are two disks after an oblique collision?"
+    return pairs(asks, rng, unlike(rng, r), v * r, offset, 1.0)
 
 
 def grazing(rng: np.random.Generator, r: float, v: float) -> Scenario:
     """Pairs that just collide, by as much as those of `near_miss` miss."""
     offset = 1 - near(rng)
-    return pairs(rng, np.array([r, r]), FASTER * v * r, offset, 0.5, "Is a grazing collision seen?")
+    return pairs("Is a grazing collision seen?", rng, np.full(2, r), FASTER * v * r, offset, 0.5)
 
 
 def near_miss(rng: np.random.Generator, r: float, v: float) -> Scenario:
-    """Pairs that do not collide."""
     offset = 1 + near(rng)
-    return pairs(
-        rng,
-        np.array([r, r]),
-        FASTER * v * r,
-        offset,
-        0.5,
-        "Is there a spurious collision of two disks that miss?",
-    )
+    asks = "Is there a spurious collision of two disks that miss?"
+    return pairs(asks, rng, np.full(2, r), FASTER * v * r, offset, 0.5)
 
 
 def unlike(rng: np.random.Generator, r: float) -> Array:
@@ -146,63 +121,61 @@ def near(rng: np.random.Generator) -> Array:
 
 
 def onto_wall(rng: np.random.Generator, r: float, v: float) -> Scenario:
-    """One disk against a wall, at an angle."""
     x = -rng.uniform(0.35, 0.4) * v * r - r
-    scene = lay_out(
+    return posed(
+        "How far off is a disk after a wall?",
+        1.0,
         position=[[x, 0.0]],
         velocity=[[v * r, v * r * rng.normal()]],
-        radius=[r],
-        mass=[1.0],
+        radius=r,
         walls=[[[0, -FAR * r], [0, FAR * r]]],
         restitution=one_restitution(rng),
     )
-    return posed("How far off is a disk after a wall?", scene, 1.0)
 
 
 def thin_wall(rng: np.random.Generator, r: float, _v: float) -> Scenario:
     """Disks that move one to three radii in the coarsest step onto a wall, judged by verdicts only:
     one that tunnels is so far off that it would outweigh all other errors."""
     speed = rng.uniform(1, 3, PASSING) * r / SAMPLE_INTERVAL
-    scene = lay_out(
+    asked = posed(
+        "Does a fast disk pass through a thin wall?",
+        0.5,
         position=np.column_stack(
             [-r - rng.uniform(0.2, 0.3, PASSING) * speed, LANE * r * np.arange(PASSING)]
         ),
         velocity=np.column_stack([speed, 0 * speed]),
-        radius=np.full(PASSING, r),
-        mass=np.ones(PASSING),
+        radius=r,
         walls=[[[0, -FAR * r], [0, FAR * r]]],
         restitution=one_restitution(rng),
     )
-    asked = posed("Does a fast disk pass through a thin wall?", scene, 0.5)
     return replace(asked, truth=None, without_truth="asked is only whether it passes")
 
 
 def onto_static(rng: np.random.Generator, r: float, v: float) -> Scenario:
-    """One disk against a larger static one."""
     y = rng.uniform(0, 2)
     x = -(rng.uniform(0.35, 0.4) * v + np.sqrt(9 - y * y))
-    scene = lay_out(
+    return posed(
+        "How far off is a disk after a static one?",
+        1.0,
         position=[[x * r, y * r], [0, 0]],
         velocity=[[v * r, 0], [0, 0]],
         radius=[r, 2 * r],
         mass=[1.0, np.inf],
         restitution=one_restitution(rng),
     )
-    return posed("How far off is a disk after a static one?", scene, 1.0)
 
 
 def wall_to_wall(rng: np.random.Generator, r: float, v: float) -> Scenario:
-    """One disk, several times back and forth."""
     reach = r + 0.2 * v * r
-    scene = lay_out(
+    return posed(
+        "How far off is a disk between two walls?",
+        2.0,
         position=[[rng.uniform(-0.1, 0.1) * v * r, 0]],
         velocity=[[v * r, 0]],
-        radius=[r],
-        mass=[1.0],
+        radius=r,
         walls=[[[-reach, -2 * r], [-reach, 2 * r]], [[reach, -2 * r], [reach, 2 * r]]],
         restitution=one_restitution(rng),
     )
-    return posed("How far off is a disk between two walls?", scene, 2.0)
 
 
 def dropped(
@@ -210,20 +183,18 @@ def dropped(
 ) -> Scenario:
     """A ball that reaches its floor at the speed v; the duration is `falls` falls of .3 to .5 s."""
     t = rng.uniform(0.3, 0.5)
-    scene = lay_out(
+    return posed(
+        "How far off is a ball that bounces?",
+        falls * t,
         position=[[0, r + v * r * t / 2]],
-        velocity=[[0, 0]],
-        radius=[r],
-        mass=[1.0],
+        radius=r,
         gravity=[0, -v * r / t],
         walls=[[[-FAR * r, 0], [FAR * r, 0]]],
         restitution=restitution,
     )
-    return posed("How far off is a ball that bounces?", scene, falls * t)
 
 
 def bouncing_elastic(rng: np.random.Generator, r: float, v: float) -> Scenario:
-    """A ball that keeps its height."""
     return dropped(rng, r, v, ELASTIC, 8.0)
 
 
@@ -245,7 +216,6 @@ def long_bounce(rng: np.random.Generator, r: float, v: float) -> Scenario:
 
 
 def coming_to_rest(rng: np.random.Generator, r: float, v: float) -> Scenario:
-    """A ball that bounces ever lower, comes to rest, and stays."""
     restitution = rng.uniform(0.4, 0.8)
     asked = dropped(rng, r, v, restitution, 2 + 2 * (1 + restitution) / (1 - restitution))
     height, g = float(asked.scene.position[0, 1]) - r, -float(asked.scene.gravity[1])
@@ -262,36 +232,33 @@ def coming_to_rest(rng: np.random.Generator, r: float, v: float) -> Scenario:
 
 
 def landing(rng: np.random.Generator, r: float, v: float) -> Scenario:
-    """A ball that stays where it lands."""
     return dropped(rng, r, v, 0.0, 3.0)
 
 
 def row(rng: np.random.Generator, r: float, v: float) -> Scenario:
-    """Five equal disks with small gaps, of which the first moves in."""
     x = np.cumsum(
         np.append(0.0, 2 * r + r * np.append(rng.uniform(0.25, 0.3) * v, rng.uniform(0.02, 0.3, 3)))
     )
-    scene = lay_out(
+    return posed(
+        "How far off is a row of disks after a collision went through it?",
+        1.0,
         position=np.stack([x, 0 * x], axis=-1),
         velocity=[[v * r, 0], *[[0, 0]] * 4],
-        radius=np.full(5, r),
-        mass=np.ones(5),
+        radius=r,
         restitution=one_restitution(rng),
     )
-    return posed("How far off is a row of disks after a collision went through it?", scene, 1.0)
 
 
 def light_between(rng: np.random.Generator, r: float, v: float) -> Scenario:
-    """A light disk between a wall and a heavy disk that moves in."""
-    scene = lay_out(
+    return posed(
+        "How far off are a light and a heavy disk after some collisions?",
+        2.0,
         position=[[rng.uniform(1.5, 3) * r, 0], [rng.uniform(5, 6) * r + 0.2 * v * r, 0]],
         velocity=[[0, 0], [-v * r / 2, 0]],
-        radius=[r, r],
+        radius=r,
         mass=[1.0, log_uniform(rng, 3, 30)],
         walls=[[[0, -2 * r], [0, 2 * r]]],
-        restitution=1.0,
     )
-    return posed("How far off are a light and a heavy disk after some collisions?", scene, 2.0)
 
 
 def small_gas(rng: np.random.Generator, r: float, v: float) -> Scenario:
@@ -299,15 +266,15 @@ def small_gas(rng: np.random.Generator, r: float, v: float) -> Scenario:
     n, pitch = 9, float(np.sqrt(np.pi / rng.uniform(0.15, 0.5))) * r
     places = pitch * (np.stack(np.meshgrid(np.arange(3), np.arange(3)), axis=-1).reshape(-1, 2) - 1)
     room, half = pitch / 2 - r, 1.5 * pitch
-    scene = lay_out(
+    return posed(
+        "How far off is a small gas before chaos has its way?",
+        6.0 / v,
         position=places + rng.uniform(-0.9 * room, 0.9 * room, (n, 2)),
         velocity=v * r * rng.normal(size=(n, 2)),
-        radius=np.full(n, r),
-        mass=np.ones(n),
+        radius=r,
         walls=box([-half] * 2, [half] * 2),
         restitution=one_restitution(rng),
     )
-    return posed("How far off is a small gas before chaos has its way?", scene, 6.0 / v)
 
 
 def long_gas(rng: np.random.Generator, r: float, v: float) -> Scenario:
@@ -324,40 +291,38 @@ def column(rng: np.random.Generator, r: float, v: float) -> Scenario:
     n = int(rng.integers(3, 9))
     r = 2.0 ** round(np.log2(r))  # so that they touch exactly
     y = r + 2 * r * np.arange(n)
-    scene = lay_out(
+    asked = posed(
+        "Does a column of disks stay as it is?",
+        2.0,
         position=np.stack([0 * y, y], axis=-1),
-        velocity=np.zeros((n, 2)),
-        radius=np.full(n, r),
-        mass=np.ones(n),
+        radius=r,
         gravity=[0, -v * r / 0.4],
         walls=[[[-FAR * r, 0], [FAR * r, 0]]],
         restitution=0.0,
     )
-    asked = posed("Does a column of disks stay as it is?", scene, 2.0)
+    scene = asked.scene
     return replace(asked, truth=lambda t: at_rest(scene, t, stacked(scene)))
 
 
 def sliding(_rng: np.random.Generator, r: float, v: float) -> Scenario:
-    """A disk on a smooth 3-4-5 incline."""
     r, g = 2.0 ** round(np.log2(r)) * 0.625, v * r
     down = np.array([4.0, -3.0]) / 5
-    scene = lay_out(
+    asked = posed(
+        "Does a disk slide down a smooth incline as it should?",
+        1.0,
         position=[np.array([0.6, 0.8]) * r],
-        velocity=[[0, 0]],
-        radius=[r],
-        mass=[1.0],
+        radius=r,
         gravity=[0, -g],
         walls=[np.array([-8 * r * down, FAR * r * down])],
         restitution=0.0,
     )
 
     def truth(t: Array) -> Trajectory:
+        scene = asked.scene
         motion = flight(t[:, None, None], scene.position, scene.velocity, 0.6 * g * down)
         return answer(scene, t, motion, stacked(scene))
 
-    return replace(
-        posed("Does a disk slide down a smooth incline as it should?", scene, 1.0), truth=truth
-    )
+    return replace(asked, truth=truth)
 
 
 FAMILIES: tuple[Sampled, ...] = (
@@ -390,7 +355,6 @@ def tuning(seeds: Sequence[int]) -> list[Scenario]:
 
 
 def one_of(family: Sampled, seed: int) -> Scenario:
-    """The scene of a family sampled from a seed."""
     rng = np.random.default_rng([seed, *family.__name__.encode()])
     made = family(rng, log_uniform(rng, *RADII), log_uniform(rng, *SPEEDS))
     return replace(made, name=f"{family.__name__}-{seed}", seed=seed)

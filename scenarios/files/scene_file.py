@@ -71,17 +71,21 @@ def scenario_of(table: dict[str, Any], source: str) -> Scenario:
 
 def _read(parse: Callable[[], dict[str, Any]], named: str, source: str) -> Scenario:
     try:
-        file = _checked(parse())
-        if not (faults := list(_outside_wrap(file))):
+        table = parse()
+        disks = table.get("disk")
+        context = {"disks": len(disks) if isinstance(disks, list) else math.inf}
+        file = SceneToml.model_validate(table, context=context)
+        faults = _outside_wrap(file)
+        if not faults:
             scenario = _scenario(file, source)
             faults = list(_overlaps(scenario.scene, len(file.wall)))
     except SceneFileError as error:
         faults = error.faults
+    except ValidationError as error:
+        faults = [_sentence(fault) for fault in error.errors(include_url=False)]
     except RecursionError:
         faults = ["arrays in arrays in arrays; must be as flat as a scene is"]
-    except (
-        ValueError
-    ) as error:  # what passes here, say a radius whose square is 0, the nouns still refuse
+    except ValueError as error:  # what the types themselves refuse, say a radius whose square is 0
         faults = str(error).split("; ")
     if len(faults) > MOST_FAULTS:
         faults[MOST_FAULTS:] = [
@@ -93,56 +97,34 @@ def _read(parse: Callable[[], dict[str, Any]], named: str, source: str) -> Scena
 
 
 def _parsed(path: Path) -> dict[str, Any]:
+    text = ""
     try:
-        text = ""
         with opened(path) as file:
             data = file.read(MOST_BYTES + 1)
         text = data[:MOST_BYTES].decode()
-        if len(data) > MOST_BYTES:
-            raise SceneFileError([f"larger than {MOST_BYTES} bytes; must be smaller"])
-        # some editors start every file with a byte order mark
-        return tomllib.loads(text.removeprefix("\ufeff"))
-    except SceneFileError:
-        raise
+        if len(data) <= MOST_BYTES:
+            # some editors start every file with a byte order mark
+            return tomllib.loads(text.removeprefix("\ufeff"))
+        fault = f"larger than {MOST_BYTES} bytes; must be smaller"
     except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise SceneFileError([f"{reason}; must be a readable TOML file"]) from None
+        fault = f"{(error.strerror or str(error)).lower()}; must be a readable TOML file"
     except UnicodeDecodeError as error:
         line, byte = data.count(b"\n", 0, error.start) + 1, data[error.start]
-        raise SceneFileError(
-            [f"line {line}: byte 0x{byte:02x} is not text; must be UTF-8"]
-        ) from None
+        fault = f"line {line}: byte 0x{byte:02x} is not text; must be UTF-8"
     except tomllib.TOMLDecodeError as error:
         what, where = str(error)[:-1].rsplit(" (at ", 1)
         if where == "end of document":
             where = f"line {text.count(chr(10)) + 1}, column {len(text) - text.rfind(chr(10))}"
-        raise SceneFileError([f"{where}: {what[0].lower()}{what[1:]}; must be TOML"]) from None
-    except (
-        ValueError
-    ) as error:  # Python's own limits: a null byte in a path, an integer of 4300 digits
+        fault = f"{where}: {what[0].lower()}{what[1:]}; must be TOML"
+    except ValueError as error:
+        # Python's own limits: a null byte in a path, an integer of 4300 digits
+        fault = f"{str(error).split(';')[0].lower()}; must be a readable TOML file"
         if long := LONG_NUMBER.search(text):
-            line = text.count("\n", 0, long.start()) + 1
-            key = (
-                text[text.rfind("\n", 0, long.start()) + 1 : long.start()].partition("=")[0].strip()
-            )
-            what = f"line {line}: {_shortened(key)}: an integer of {len(long[0])} digits"
-            raise SceneFileError(
-                [f"{what}; must be a number of at most {sys.get_int_max_str_digits()}"]
-            ) from None
-        raise SceneFileError(
-            [f"{str(error).split(';')[0].lower()}; must be a readable TOML file"]
-        ) from None
-
-
-def _checked(table: dict[str, Any]) -> SceneToml:
-    disks = table.get("disk")
-    try:
-        context = {"disks": len(disks) if isinstance(disks, list) else math.inf}
-        return SceneToml.model_validate(table, context=context)
-    except ValidationError as error:
-        raise SceneFileError(
-            _sentence(fault) for fault in error.errors(include_url=False)
-        ) from None
+            *before, last = text[: long.start()].split("\n")
+            key, most = _shortened(last.partition("=")[0].strip()), sys.get_int_max_str_digits()
+            what = f"line {len(before) + 1}: {key}: an integer of {len(long[0])} digits"
+            fault = f"{what}; must be a number of at most {most}"
+    raise SceneFileError([fault])
 
 
 def _sentence(fault: ErrorDetails) -> str:
@@ -230,16 +212,15 @@ def _scenario(file: SceneToml, source: str) -> Scenario:
     return with_oracle(question)
 
 
-def _outside_wrap(file: SceneToml) -> Iterator[str]:
+def _outside_wrap(file: SceneToml) -> list[str]:
     if not file.wrap:
-        return
+        return []
     low, high = file.wrap.low, file.wrap.high
-    for i, disk in enumerate(file.disk):
-        if not all(a <= x <= b for a, x, b in zip(low, disk.position, high)):
-            yield (
-                f"disk[{i}].position = {disk.position}: outside [wrap]; must be from {low} to"
-                f" {high} (m)"
-            )
+    return [
+        f"disk[{i}].position = {disk.position}: outside [wrap]; must be from {low} to {high} (m)"
+        for i, disk in enumerate(file.disk)
+        if not all(a <= x <= b for a, x, b in zip(low, disk.position, high))
+    ]
 
 
 def _overlaps(scene: Scene, free_walls: int) -> Iterator[str]:

@@ -42,25 +42,22 @@ def of_size(value: float, power: int = 1) -> float:
     return value
 
 
-def finite_in_scale(value: float) -> float:
-    """A number that may be infinite."""
-    return value if math.isinf(value) else in_scale(value)
-
-
 Strict = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Finite = Annotated[Strict, AfterValidator(in_scale)]
 Size = Annotated[Strict, AfterValidator(of_size)]
-Time = Annotated[float, Field(strict=True), AfterValidator(finite_in_scale)]
+Time = Annotated[
+    float,
+    Field(strict=True),
+    AfterValidator(lambda value: value if math.isinf(value) else in_scale(value)),
+]
+# kg m m; what is infinite does not turn
+Inertia = Annotated[
+    float,
+    Field(strict=True),
+    AfterValidator(lambda value: value if math.isinf(value) else of_size(value, power=3)),
+]
 Pair = Annotated[list[Finite], Field(min_length=2, max_length=2)]
 Count = Annotated[int, Field(strict=True, ge=1)]
-
-
-def inertia_of_size(value: float) -> float:
-    """Of kg m m; what is infinite does not turn."""
-    return value if math.isinf(value) else of_size(value, power=3)
-
-
-Inertia = Annotated[float, Field(strict=True), AfterValidator(inertia_of_size)]
 
 
 class _Table(BaseModel):
@@ -68,8 +65,6 @@ class _Table(BaseModel):
 
 
 class DiskTable(_Table):
-    """A [[disk]]."""
-
     static: bool = Field(False, strict=True, description="true or false")
     position: Pair = Field(description="two finite numbers [x, y] (m)")
     velocity: Pair | None = Field(
@@ -104,8 +99,6 @@ class DiskTable(_Table):
 
 
 class WallTable(_Table):
-    """A [[wall]], a segment."""
-
     start: Pair = Field(description="two finite numbers [x, y] (m)")
     end: Pair = Field(description="two finite numbers [x, y] (m)")
 
@@ -124,8 +117,6 @@ class WallTable(_Table):
 
 
 class CornersTable(_Table):
-    """[box] or [wrap]."""
-
     low: Pair = Field(description="the lower left corner, two finite numbers [x, y] (m)")
     high: Pair = Field(description="the upper right corner, two finite numbers [x, y] (m)")
 
@@ -143,8 +134,6 @@ class CornersTable(_Table):
 
 
 class ThrustTable(_Table):
-    """A [[thrust]]."""
-
     disk: int = Field(strict=True, description="the number of a disk in this file, from 0")
     start: Finite = Field(ge=0, description="finite and at least 0 (s)")
     stop: Time = Field(description="after start (s); inf: to the end")
@@ -170,8 +159,6 @@ class ThrustTable(_Table):
 
 
 class SceneToml(_Table):
-    """The whole file."""
-
     name: str = Field(
         pattern=r"\A[a-z0-9][a-z0-9_-]{0,99}\z", description="at most 100 of a-z, 0-9, '_' and '-'"
     )

@@ -67,14 +67,12 @@ def key_of(scenario: Scenario, certifying: bool) -> str:
 
 @cache
 def source_hash(folder: Path = HERE) -> str:
-    """A hash of the source in this folder, so that records of another version of the oracle are
-    never used."""
+    """So that records of another version of the oracle are never used."""
     files = sorted(folder.rglob("*.py"))
     return hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()
 
 
 def look_up(key: str) -> dict[str, Any] | None:
-    """The fields of the record cached under `key`; None if there is none that can be read."""
     with suppress(OSError, Damaged), closing(opened_rows(writing=False)) as rows:
         row = rows.get(KIND, key)
         return None if row is None else unpacked(row.blob)
@@ -82,7 +80,6 @@ def look_up(key: str) -> dict[str, Any] | None:
 
 
 def keep(key: str, fields: dict[str, Any]) -> bool:
-    """Write the fields of a record under `key`, all or nothing; False if that cannot be done."""
     with suppress(OSError, Damaged), closing(opened_rows()) as rows:
         rows.put(KIND, key, None, packed(fields), again=False)
         return True
@@ -90,7 +87,7 @@ def keep(key: str, fields: dict[str, Any]) -> bool:
 
 
 def fault() -> str:
-    """Why nothing is cached, as a sentence; "" if the cache can be used."""
+    """Why nothing is cached; "" if the cache can be used."""
     try:
         opened_rows().close()
     except OSError as error:
@@ -102,8 +99,7 @@ def fault() -> str:
 
 
 def opened_rows(writing: bool = True) -> Rows:
-    """The rows of the cache, into which many processes write; `writing` makes the file where there
-    is none. Raises `OSError` or `Damaged`."""
+    """Opened for many processes; `writing` makes the file. Raises `OSError` or `Damaged`."""
     where = folder()
     if where is None:
         raise FileNotFoundError(ENOENT, "there is no home folder")
@@ -113,7 +109,6 @@ def opened_rows(writing: bool = True) -> Rows:
 
 
 def packed(fields: dict[str, Any]) -> bytes:
-    """The fields of a record as bytes."""
     file = io.BytesIO()
     numbers = json.dumps({name: fields[name] for name in NUMBERS})
     np.savez_compressed(file, **{name: fields[name] for name in ARRAYS}, numbers=np.array(numbers))
@@ -121,7 +116,6 @@ def packed(fields: dict[str, Any]) -> bytes:
 
 
 def unpacked(data: bytes) -> dict[str, Any]:
-    """The fields of the record that `packed` gave."""
     with np.load(io.BytesIO(data), allow_pickle=False) as saved:
         numbers = json.loads(str(saved["numbers"]))
         arrays = {name: frozen(saved[name]) for name in ARRAYS}

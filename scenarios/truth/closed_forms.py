@@ -56,7 +56,6 @@ def answer(
 
 
 def at_rest(scene: Scene, t: Array, collisions: Iterable[Collision] = ()) -> Trajectory:
-    """The disks stay where they are (a stack whose supports carry it), at the times t (k,) s."""
     position = np.broadcast_to(scene.position, (len(t), scene.n, 2))
     return answer(scene, t, (position, np.zeros_like(position)), collisions)
 
@@ -91,7 +90,6 @@ class Legs:
     acceleration: Array
 
     def at(self, t: Array) -> Motion:
-        """Position and velocity (k, ...) at the times t (k,) s."""
         leg = np.searchsorted(self.start, t, side="right") - 1
         since = (t - self.start[leg]).reshape(-1, *[1] * (self.position.ndim - 1))
         return flight(since, self.position[leg], self.velocity[leg], self.acceleration[leg])
@@ -110,7 +108,7 @@ class Legs:
 
 
 def geometric(ratio: float, count: Array) -> Array:
-    """1 + ratio + ratio^2 + ... of `count` terms; any shape."""
+    """1 + ratio + ratio^2 + ... of `count` terms."""
     return count if ratio == 1 else (1 - ratio**count) / (1 - ratio)
 
 

@@ -15,9 +15,8 @@ from crosscheck2d.scenarios.truth.cache import keep, key_of, look_up
 from crosscheck2d.scenarios.truth.oracle.bodies import Leg
 from crosscheck2d.scenarios.truth.oracle.events import trace, turns_with_disk
 from crosscheck2d.scenarios.truth.oracle.numbers import Numbers, Undecided, balls, digits, has_balls
-from crosscheck2d.scenarios.truth.oracle.path import Path
+from crosscheck2d.scenarios.truth.oracle.path import Path, TimeLimit, WorkLimit
 from crosscheck2d.scenarios.truth.oracle.resting import FOR_SERIES
-from crosscheck2d.scenarios.truth.oracle.work import TimeLimit, WorkLimit
 from crosscheck2d.scenarios.truth.record import (
     CERTIFIED,
     TWO_PRECISIONS,
@@ -71,8 +70,8 @@ class OracleTruth:
         return record.sampled(one.scene, one.thrusts, t)
 
     def record(self, clock: TimeLimit | None = None) -> TruthRecord:
-        """The record, from the cache or computed. A computed one is cached unless the time of
-        `clock` ran out. Raises `NoTruth`."""
+        """From the cache or computed; cached unless the time of `clock` ran out. Raises
+        `NoTruth`."""
         if self.known is not None:
             return self.known
         key = key_of(self.scenario, has_balls())
@@ -86,14 +85,12 @@ class OracleTruth:
 
 
 def answered_by(scenario: Scenario) -> str:
-    """What gives the truth of a scenario: `CLOSED_FORM`, `EVENT_DRIVEN` or `NOTHING`."""
     if scenario.truth is None:
         return NOTHING
     return EVENT_DRIVEN if isinstance(scenario.truth, OracleTruth) else CLOSED_FORM
 
 
 def with_oracle(scenario: Scenario) -> Scenario:
-    """The scenario with the oracle for its truth."""
     return replace(scenario, truth=OracleTruth(scenario), without_truth="")
 
 
@@ -138,7 +135,7 @@ def certified(scenario: Scenario, forced: Sequence[Thrust], clock: TimeLimit) ->
             path = trace(
                 scenario.scene, forced, until, balls(bits), WorkLimit(allowed_steps(bits), clock)
             )
-            error, reached = spread(path, until), until
+            error, reached = widest(widths(path), min(path.end, until)), until
             if error < accuracy and not clock.expired:
                 return record_of(scenario, path, error, bits, CERTIFIED)
         except Undecided as doubt:
@@ -155,15 +152,12 @@ def certified(scenario: Scenario, forced: Sequence[Thrust], clock: TimeLimit) ->
 
 
 def allowed_steps(bits: int) -> int:
-    """The steps of the event loop that one attempt may take in numbers of `bits` bits."""
     return int(WORK / (1 + bits / HEAVY))
 
 
 def farthest(
     scenario: Scenario, attempts: Sequence[tuple[Path, int]], clock: TimeLimit
 ) -> TruthRecord:
-    """The record of the attempt that got farthest, up to where it is exact; an attempt is a path
-    and its bits."""
     found = [
         (exact_until(path, scenario.duration, accuracy_of(scenario)), path, bits)
         for path, bits in attempts
@@ -175,18 +169,13 @@ def farthest(
 
 
 def exact_until(path: Path, until: float, accuracy: float) -> tuple[float, float]:
-    """The time, s, up to which the spread of a path is below `accuracy` m, to the last place of
-    float64, and the spread, m, at that time."""
+    """The time, s, up to which the spread of a path is below `accuracy` m, and the spread, m,
+    then."""
     table, end = widths(path), min(path.end, until)
     if (most := widest(table, end)) < accuracy:
         return end, most
     held = last_time(lambda t: widest(table, t) < accuracy, end)
     return held, widest(table, held)
-
-
-def spread(path: Path, until: float) -> float:
-    """m, the largest possible distance of the exact motion from the midpoints of the balls."""
-    return widest(widths(path), min(path.end, until))
 
 
 def widths(path: Path) -> Array:
@@ -209,7 +198,6 @@ def widths(path: Path) -> Array:
 
 
 def widest(table: Array, until: float) -> float:
-    """m, the largest radius of a ball up to `until` s, from a table of `widths`."""
     begun = table[table[:, 0] <= until]
     return float((begun[:, 1] + begun[:, 2] * (until - begun[:, 0])).max())
 
@@ -217,8 +205,6 @@ def widest(table: Array, until: float) -> float:
 def two_precisions(
     scenario: Scenario, forced: Sequence[Thrust], kind: Callable[[int], Numbers], clock: TimeLimit
 ) -> TruthRecord:
-    """The record in numbers of one kind, up to where a computation with twice as many bits agrees,
-    or until the time of `clock` runs out."""
     scene, until, bits = scenario.scene, scenario.duration, FEWEST_BITS
     attempts: list[tuple[Path, float, int]] = []
     while True:
@@ -252,8 +238,8 @@ def two_precisions(
 
 
 def _out_of_scale(scenario: Scenario) -> str:
-    """A sentence on a quantity that is too small or too large for `Numbers.tie`, which assumes
-    numbers of the order of 1; "" if there is none."""
+    """What is too small or too large for `Numbers.tie`, which assumes numbers of the order of 1, or
+    ""."""
     scene = scenario.scene
     if not (scene.radius >= 1 / LARGEST).all():
         return (
@@ -284,15 +270,14 @@ def _out_of_scale(scenario: Scenario) -> str:
 
 
 def accuracy_of(scenario: Scenario) -> float:
-    """m, `ACCURACY` of the smallest radius: the same in any unit of length."""
     return ACCURACY * float(scenario.scene.radius.min())
 
 
 def difference(
     coarse: Path, fine: Path, until: float, k: Numbers, accuracy: float
 ) -> tuple[float, float]:
-    """The time, s, at which two paths diverge, or inf: the first event at which they differ by
-    `accuracy` m; and the largest difference before it, m."""
+    """When two paths first differ by `accuracy` m (s, or inf), and the largest difference before,
+    m."""
     diverged, errors = np.inf, [(0.0, 0.0)]
     end = min(coarse.end, fine.end, until)
     with k.precise():
@@ -311,7 +296,6 @@ def difference(
 
 
 def _apart(one: Leg, other: Leg, left: float) -> float:
-    """m, the largest distance between two flights from their start to `left` s later."""
     place = max(abs(float(one.x - other.x)), abs(float(one.y - other.y)))
     speed = max(abs(float(one.vx - other.vx)), abs(float(one.vy - other.vy)))
     if one.turn is not None and other.turn is not None:

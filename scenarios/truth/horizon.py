@@ -91,38 +91,28 @@ class Body(NamedTuple):
 
 class TangentVectors:
     """Deviations of a motion, to first order, carried along a path: one for a rounding error of
-    each number of the initial state.
-
-    Attributes:
-        moving: the disks that are not static.
-        t: (n,) s, the time up to which each disk has been carried.
-        leg: (n,) the index of its leg then.
-        dx, dv, dw: (n, d, 2) m, m/s and (n, d) rad/s, the deviations of each disk then, for each of
-            the d numbers.
-        collided_at, v, spin: (n,) s, (n, 2) m/s and (n,) rad/s, the time of the last collision of
-            each disk, and its velocity after that.
-        instant: s, the latest collision.
-        late: (d,) s, its delay for each deviation.
-        diverged: s, when the first disk diverges; inf: none has so far.
-    """
+    each of the d numbers of the initial state."""
 
     def __init__(self, scenario: Scenario, path: Path) -> None:
         scene = scenario.scene
         self.scene, self.path, self.moving = scene, path, np.flatnonzero(~scene.static).tolist()
+        # (n,) s, up to when each disk has been carried; its leg then; and its deviations then:
+        # (n, d, 2) m and m/s, (n, d) rad/s
         self.t, self.leg = np.zeros(scene.n), [0] * scene.n
         self.dx, self.dv, self.dw = roundings(scene)
+        # (n,) s, (n, 2) m/s, (n,) rad/s: the last collision of each disk, its velocity after that
         self.collided_at, self.v = np.full(scene.n, -1.0), np.zeros((scene.n, 2))
         self.spin = np.zeros(scene.n)
         turns = ~scene.static & np.isfinite(scene.inertia)
         self.inverse_inertia = np.where(turns, 1 / scene.inertia, 0.0)
+        # s, the latest collision; (d,) s, its delay for each deviation
         self.instant, self.late = 0.0, np.zeros(self.dx.shape[1])
         self.starts_and_stops = {
             edge for thrust in scenario.thrusts for edge in (thrust.start, thrust.stop)
         }
-        self.diverged = np.inf
+        self.diverged = np.inf  # s, when the first disk diverges
 
     def carry(self, i: int, until: float) -> None:
-        """Carry disk i to `until` s, over all of its legs that begin before."""
         legs = self.path.legs[i]
         while self.leg[i] + 1 < len(legs) and (t := float(legs[self.leg[i] + 1].t)) < until:
             self.fly(i, t)
@@ -130,7 +120,6 @@ class TangentVectors:
         self.fly(i, until)
 
     def fly(self, i: int, until: float) -> None:
-        """Carry disk i to `until` s on its leg, and note when it diverges."""
         hop = self.path.legs[i][self.leg[i]].hop
         if hop is not None:
             self.bounce(i, hop)
@@ -171,7 +160,6 @@ class TangentVectors:
             part[i] -= np.outer(part[i] @ normal, normal)
 
     def change_leg(self, i: int, t: float) -> None:
-        """Carry disk i over to its next leg, which begins at `t` s."""
         before, leg = self.path.legs[i][self.leg[i] : self.leg[i] + 2]
         self.leg[i] += 1
         # `collide` has done this for a collision, and a thrust starts and stops at given times.
@@ -183,33 +171,28 @@ class TangentVectors:
             self.hold(i, contact.j if contact.kind == "wall" and len(leg.held) == 1 else None)
 
     def release_delay(self, i: int, leg: Leg, t: float) -> Array:
-        """(d,) s, the delay at which disk i leaves the end of its wall, or a disk that another one
-        strikes; or at which its slip ends."""
+        """(d,) s: at the end of its wall, at the stroke of another disk, or where its slip ends."""
+        late: Array
         if leg.turn is not None and leg.held and leg.held == self.path.legs[i][self.leg[i]].held:
-            return self.slip_end_delay(i, leg)
+            contact, arm = leg.held[0], float(self.scene.radius[i])
+            start, end = self.scene.walls[contact.j]
+            way, arm = (end - start) / np.hypot(*(end - start)), arm * contact.side
+            slower = float(acceleration(leg) @ way + arm * rate(leg))
+            if not slower:  # no slip ends: a group of disks begins or ends
+                return np.zeros_like(self.late)
+            late = -(self.dv[i] @ way + arm * self.dw[i]) / slower
+            return late
         spans = [
             self.scene.walls[c.j, 1] - self.scene.walls[c.j, 0]
             for c in leg.held
             if c.kind == "wall"
         ]
         if len(spans) == 1 and (speed := float(spans[0] @ along(leg, t)[1])):
-            late: Array = -self.dx[i] @ spans[0] / speed
+            late = -self.dx[i] @ spans[0] / speed
             return late
         return self.late if t == self.instant else np.zeros_like(self.late)
 
-    def slip_end_delay(self, i: int, leg: Leg) -> Array:
-        """(d,) s, the delay at which the slip of disk i along its wall ends."""
-        contact, arm = leg.held[0], float(self.scene.radius[i])
-        start, end = self.scene.walls[contact.j]
-        way, arm = (end - start) / np.hypot(*(end - start)), arm * contact.side
-        slower = float(acceleration(leg) @ way + arm * rate(leg))
-        if not slower:  # no slip ends: a group of disks begins or ends
-            return np.zeros_like(self.late)
-        late: Array = -(self.dv[i] @ way + arm * self.dw[i]) / slower
-        return late
-
     def hold(self, i: int, wall: int | None) -> None:
-        """Keep only the deviation of disk i along a wall, or none."""
         way = np.zeros(2)
         if wall is not None:
             start, end = self.scene.walls[wall]
@@ -257,8 +240,6 @@ class TangentVectors:
                 self.spin[disk] = body.spin - arm * friction
 
     def delay(self, event: Event, one: Body, two: Body) -> Array:
-        """(d,) s, the delay of a collision of these two, as they are before it, for each
-        deviation."""
         way = two.x - one.x
         # normal.dv itself would lose its digits in a grazing collision
         closing = -float(event.impulse) * (one.weight + two.weight) / (1 + self.scene.restitution)
@@ -269,7 +250,7 @@ class TangentVectors:
         self, one: Body, two: Body, normal: Array, tilt: Array, impulse: float, more: Array
     ) -> tuple[float, Array]:
         """N s, the impulse of friction on `two` along the tangent, and its deviations (d,); see
-        `oracle/friction.py`.
+        `oracle/ties.py`.
 
         tilt, more: (d, 2) and (d,) N s, the deviations of the normal and of the impulse.
         """
@@ -289,7 +270,6 @@ class TangentVectors:
         return way * most, way * self.scene.friction * more
 
     def body(self, i: int, t: float) -> Body:
-        """Disk i at `t` s, after the collisions of that instant carried out so far."""
         if not self.scene.static[i]:
             self.carry(i, t)
         legs, k = self.path.legs[i], self.leg[i]
@@ -314,8 +294,8 @@ class TangentVectors:
         )
 
     def other(self, event: Event, one: Body) -> tuple[Body, float]:
-        """The other side of a collision, and the distance, m, over which a shift tilts the normal:
-        inf at the face of a wall."""
+        """The other side, and the distance, m, over which a shift tilts the normal: inf at a wall's
+        face."""
         if event.j >= 0:
             two = self.body(event.j, float(event.t))
             return two, float(np.hypot(*(two.x - one.x)))
@@ -328,25 +308,22 @@ class TangentVectors:
 
 
 def along(leg: Leg, t: float) -> tuple[Array, Array]:
-    """Position and velocity (2,) on a leg at `t` s; without the bounces along the normal."""
+    """Without the bounces along the normal."""
     since, x, y, vx, vy, ax, ay = t - float(leg.t), *map(float, leg[1:7])
     v, a = np.array([vx, vy]), np.array([ax, ay])
     return np.array([x, y]) + (v + a * since / 2) * since, v + a * since
 
 
 def rate(leg: Leg) -> float:
-    """The angular acceleration, rad/s2, on a leg; 0 without friction."""
     return 0.0 if leg.turn is None else float(leg.turn.rate)
 
 
 def perpendicular(vector: Array) -> Array:
-    """Vectors (..., 2) turned by 90 degrees to the left."""
     turned: Array = vector[..., ::-1] * [-1.0, 1.0]
     return turned
 
 
 def acceleration(leg: Leg) -> Array:
-    """(2,) m/s2 on a leg, with the acceleration towards the wall during bounces."""
     a = np.array([float(leg.ax), float(leg.ay)])
     return (
         a

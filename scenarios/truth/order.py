@@ -70,20 +70,12 @@ class Near(NamedTuple):
 
 
 class CollisionOrder:
-    """Whether rounding decides the order of the collisions of a path, from its `tangents`.
-
-    Attributes:
-        end: s, of the path.
-        legs: (l, 8) t s, disk, x, y m, vx, vy m/s, ax, ay m/s2, sorted by time.
-        begun: how many of the legs have begun.
-        now: (n, 8) the latest leg of each disk that has begun.
-        span: (w, 2) m, each wall from its start to its end.
-        way: (w, 2) 1/m, `span` over its length squared.
-    """
+    """Whether rounding decides the order of the collisions of a path, from its `tangents`."""
 
     def __init__(self, scenario: Scenario, path: Path, tangents: TangentVectors) -> None:
         self.scene, self.path, self.tangents = scenario.scene, path, tangents
         self.end = min(path.end, scenario.duration)
+        # (l, 8) t s, disk, x, y m, vx, vy m/s, ax, ay m/s2, sorted by time
         rows = [
             # A thrust that turns with its disk ends before the disk touches anything.
             [*map(float, (leg.t, i, *((np.nan,) * 6 if leg.jet else leg[1:7])))]
@@ -91,8 +83,10 @@ class CollisionOrder:
             for leg in legs
         ]
         self.legs = np.array(sorted(rows, key=lambda row: row[0]))
+        # how many of the legs have begun, and (n, 8) the latest of these of each disk
         self.begun, self.now = 0, np.zeros((self.scene.n, 8))
         self.span = self.scene.walls[:, 1] - self.scene.walls[:, 0]
+        # 1/m; the share of the wall at which the foot of a vector lies
         self.way = self.span / (self.span**2).sum(axis=1)[:, None]
 
     def cut(self, event: Event) -> Path | None:
@@ -125,7 +119,10 @@ class CollisionOrder:
         """The contact of a collision, here with speed 0, and those within the rounding of it that
         are connected to it by disks; none if it is the only one."""
         t, own = float(event.t), {event.i, event.j}
-        self.begin(t)
+        # Each disk is put on its latest leg that begins before.
+        while self.begun < len(self.legs) and (row := self.legs[self.begun])[0] < t:
+            self.now[int(row[1])] = row
+            self.begun += 1
         waiting, done, found = [i for i in own if i >= 0], set[int](), list[Near]()
         if not any(own - {i, j} or j not in own for i in waiting for j in self.close(i, t)):
             return []
@@ -140,12 +137,6 @@ class CollisionOrder:
                     waiting += [j] * (j >= 0)
             done.add(i)
         return found
-
-    def begin(self, t: float) -> None:
-        """Put each disk on its latest leg that begins before `t` s."""
-        while self.begun < len(self.legs) and (row := self.legs[self.begun])[0] < t:
-            self.now[int(row[1])] = row
-            self.begun += 1
 
     def close(self, i: int, t: float) -> list[int]:
         """The disks, and -1 - wall, whose gap to disk i is at most `CLOSE` at `t` s."""
@@ -182,14 +173,13 @@ class CollisionOrder:
         return Near(contact, way, max(closing, 0.0))
 
     def held(self, i: int) -> tuple[Contact, ...]:
-        """The contacts on which disk i rests."""
         return self.path.legs[i][self.tangents.leg[i]].held
 
     def outcomes(
         self, near: list[Near], t: float
     ) -> tuple[list[TieOutcome], list[list[tuple[int, int]]]]:
-        """The outcomes of these contacts over all orders, as `CollisionLaw.outcomes`, without those
-        from which no disk diverges until the end; and the collisions of each, as `Path.named`."""
+        """Over all orders; without those from which no disk diverges until the end. And
+        `Path.named`."""
         k, scene = digits(BITS), self.scene
         with k.precise():
             bodies, v, ends = Bodies(scene, k), Velocities(), list[TieOutcome]()

@@ -13,7 +13,7 @@ from crosscheck2d.scenarios.truth.closed_forms import Collision, answer, flight,
 from crosscheck2d.scenarios.truth.horizon import DIVERGED
 from crosscheck2d.scenarios.truth.oracle.bodies import nearest
 from crosscheck2d.scenarios.truth.oracle.jets import count_pieces, push
-from crosscheck2d.scenarios.truth.oracle.path import Event, Path
+from crosscheck2d.scenarios.truth.oracle.path import Path
 from crosscheck2d.scenarios.truth.order import float64_horizon
 
 EPS = float(np.finfo(float).eps)
@@ -34,46 +34,36 @@ NORMAL, SPEED, FALL, TURN = slice(8, 10), 10, 11, slice(12, 15)
 
 @dataclass(frozen=True, eq=False)
 class TruthRecord:
-    """An exact motion as a list of flights, with its error bound and its horizon.
+    """An exact motion as a list of flights, with its error bound and its horizon."""
 
-    Attributes:
-        legs: (l, 15) disk, t s, x, y m, vx, vy m/s, ax, ay m/s2; then, where the disk bounces on a
-            wall until it rests, the normal nx, ny, the speed m/s after the first bounce and the
-            acceleration m/s2 towards the wall, else 0; then, where there is friction, angle rad,
-            spin rad/s and its rate rad/s2, else 0. Sorted by disk, then by time.
-        events: (h, 5) t s, disk, other disk or -1 - wall, impulse N s, cosine of the impact angle
-            |v_n| / |v|; an impulse of 0 is no collision: from then on the disk rests on the other.
-        horizon: s; the motion is not known after it.
-        error_bound: m.
-        bits: precision of the numbers it was computed with.
-        method: "closed form", `TWO_PRECISIONS` (half as many bits give the same), `CERTIFIED`
-            (interval arithmetic), or `SEARCHED`.
-        reason: why it ends where it does.
-        float64_horizon: s; up to then float64 engines are compared with it, see `order.py`.
-        outcomes: (o, 4) outcome, disk, vx, vy m/s: all possible outcomes, where the motion ends
-            because the order of collisions matters that are simultaneous but for a rounding.
-        orders: (p, 3) outcome, disk, other: for each outcome one order of collisions that leads to
-            it.
-        remains: sentences on what still holds after the end.
-    """
-
+    # (l, 15) disk, t s, x, y m, vx, vy m/s, ax, ay m/s2; then, where the disk bounces on a wall
+    # until it rests, the normal nx, ny, the speed m/s after the first bounce and the acceleration
+    # m/s2 towards the wall, else 0; then, where there is friction, angle rad, spin rad/s and its
+    # rate rad/s2, else 0. Sorted by disk, then by time.
     legs: Array = field(repr=False)
+    # (h, 5) t s, disk, other disk or -1 - wall, impulse N s, cosine of the impact angle
+    # |v_n| / |v|; an impulse of 0 is no collision: from then on the disk rests on the other.
     events: Array = field(repr=False)
-    horizon: float
-    error_bound: float
-    bits: int
+    horizon: float  # s; the motion is not known after it
+    error_bound: float  # m
+    bits: int  # precision of the numbers it was computed with
+    # "closed form", `TWO_PRECISIONS` (half as many bits give the same), `CERTIFIED` (interval
+    # arithmetic), or `SEARCHED`
     method: str
-    reason: str
-    float64_horizon: float = np.inf
+    reason: str  # why it ends where it does
+    float64_horizon: float = np.inf  # s; up to then float64 engines are compared, see `order.py`
+    # (o, 4) outcome, disk, vx, vy m/s: all possible outcomes, where the motion ends because the
+    # order of collisions matters that are simultaneous but for a rounding
     outcomes: Array = field(repr=False, default_factory=lambda: frozen(np.zeros((0, 4))))
+    # (p, 3) outcome, disk, other: for each outcome one order of collisions that leads to it
     orders: Array = field(repr=False, default_factory=lambda: frozen(np.zeros((0, 3))))
-    remains: tuple[str, ...] = ()
+    remains: tuple[str, ...] = ()  # sentences on what still holds after the end
 
     def motion(
         self, scene: Scene, thrusts: Sequence[Thrust], t: Array
     ) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-        """Position and velocity (k, n, 2) m, m/s, and angle and spin (k, n) rad, rad/s, at the
-        times t (k,) s before the horizon."""
+        """Position and velocity, and angle and spin, (k, n, ...) each, at t (k,) s before the
+        horizon."""
         position, velocity = np.empty((len(t), scene.n, 2)), np.empty((len(t), scene.n, 2))
         turning = world_thrusts(scene, [replace(p, force=np.zeros(2)) for p in thrusts], t)
         angle, spin = turning.angle.copy(), turning.angular_velocity.copy()
@@ -95,8 +85,6 @@ class TruthRecord:
         return (position, velocity), (angle, spin)
 
     def sampled(self, scene: Scene, thrusts: Sequence[Thrust], t: Array) -> Trajectory:
-        """The motion at the times t (k,) s up to where it is known, and to the horizon of float64;
-        later times are left out."""
         t = np.asarray(t, float)
         moved, turned = self.motion(scene, thrusts, t)
         # A disk that rests on a wall from the start has a contact without impulse at t = 0. One
@@ -167,18 +155,17 @@ def powers(e: float, k: Array | int) -> Array:
 
 
 def record_of(scenario: Scenario, path: Path, error: float, bits: int, method: str) -> TruthRecord:
-    """The record of a path whose error is at most `error` m up to its end."""
     until, path = float64_horizon(scenario, within_float64(scenario, path, error))
     end = min(path.end, scenario.duration) if path.reason else np.inf
     if method == CERTIFIED and path.searched < end:
         method = SEARCHED
     legs = legs_of(path, end)
-    rows = [_row(event) for event in path.events if float(event.t) < end]
-    rows += [
-        collision
-        for leg, stop in bouncing(legs, min(end, float(np.nextafter(scenario.duration, np.inf))))
-        for collision in bounces(scenario, leg, stop)
+    rows = [
+        [float(t), *((i, j) if j < 0 or i < j else (j, i)), float(impulse), cosine]
+        for t, i, j, impulse, cosine, _ in path.events
+        if float(t) < end
     ]
+    rows += bounces(scenario, legs, min(end, float(np.nextafter(scenario.duration, np.inf))))
     outcomes = [
         [k, i, *map(float, v[:2])]
         for k, one in enumerate(path.outcomes)
@@ -233,7 +220,6 @@ def last_time(holds: Callable[[float], bool], end: float) -> float:
 
 
 def legs_of(path: Path, end: float) -> Array:
-    """The legs of a path that begin before `end` s, (l, 15) as in `TruthRecord.legs`."""
     flights = [
         (i, leg)
         for i, legs in enumerate(path.legs)
@@ -275,47 +261,29 @@ def reach_of_jets(scenario: Scenario, legs: Array) -> float:
     return total
 
 
-def _row(event: Event) -> list[float]:
-    i, j = (event.i, event.j) if event.j < 0 or event.i < event.j else (event.j, event.i)
-    return [float(event.t), i, j, float(event.impulse), event.cosine]
-
-
-def bouncing(legs: Array, end: float) -> Iterator[tuple[Array, float]]:
-    """The legs with bounces, each with the time, s, at which it ends."""
-    for k in np.flatnonzero(legs[:, SPEED] > 0):
-        follows = k + 1 < len(legs) and legs[k + 1, DISK] == legs[k, DISK]
-        yield legs[k], min(end, legs[k + 1, T] if follows else np.inf)
-
-
-def bounces(scenario: Scenario, leg: Array, stop: float) -> Iterator[list[float]]:
-    """Rows as in `TruthRecord.events` for the bounces on a leg before `stop` s that last
+def bounces(scenario: Scenario, legs: Array, end: float) -> Iterator[list[float]]:
+    """Rows as in `TruthRecord.events` for the bounces on legs before `end` s that last
     `LEAST_SHARE` of the duration or more."""
     scene = scenario.scene
-    e, v, g, disk = scene.restitution, leg[SPEED], leg[FALL], int(leg[DISK])
-    least = LEAST_SHARE * scenario.duration
-    count = max(0, int(np.ceil(np.log(least * g / (2 * v)) / np.log(e))))
-    for k in range(1, count):
-        t = leg[T] + 2 * v / g * float(powers(e, k))
-        if t >= stop:
-            return
-        place, sliding = flight(t - leg[T], leg[PLACE], leg[VELOCITY], leg[ACCELERATION])
-        before, beside = v * e ** (k - 1), np.hypot(*sliding)
-        kick = scene.mass[disk] * (1 + e) * before
-        yield [
-            t,
-            disk,
-            -1 - wall_of_bounces(scene, leg, place),
-            kick,
-            before / np.hypot(before, beside),
-        ]
-
-
-def wall_of_bounces(scene: Scene, leg: Array, place: Array) -> int:
-    """The wall on which the disk of a leg bounces at `place` (2,) m: the nearest one parallel to
-    the leg."""
-    span, (_, distance) = scene.walls[:, 1] - scene.walls[:, 0], nearest(place[None], scene.walls)
-    slope = np.abs((span * leg[NORMAL]).sum(axis=1)) / np.hypot(*span.T)
-    return int(np.argmin(np.abs(distance[0] - scene.radius[int(leg[DISK])]) + slope))
+    e, least = scene.restitution, LEAST_SHARE * scenario.duration
+    span = scene.walls[:, 1] - scene.walls[:, 0]
+    for row in np.flatnonzero(legs[:, SPEED] > 0):
+        leg, follows = legs[row], row + 1 < len(legs) and legs[row + 1, DISK] == legs[row, DISK]
+        stop = min(end, legs[row + 1, T] if follows else np.inf)
+        v, g, disk = leg[SPEED], leg[FALL], int(leg[DISK])
+        count = max(0, int(np.ceil(np.log(least * g / (2 * v)) / np.log(e))))
+        for k in range(1, count):
+            t = leg[T] + 2 * v / g * float(powers(e, k))
+            if t >= stop:
+                break
+            place, sliding = flight(t - leg[T], leg[PLACE], leg[VELOCITY], leg[ACCELERATION])
+            # the nearest wall parallel to the leg
+            _, distance = nearest(place[None], scene.walls)
+            slope = np.abs((span * leg[NORMAL]).sum(axis=1)) / np.hypot(*span.T)
+            wall = int(np.argmin(np.abs(distance[0] - scene.radius[disk]) + slope))
+            before, beside = v * e ** (k - 1), np.hypot(*sliding)
+            kick = scene.mass[disk] * (1 + e) * before
+            yield [t, disk, -1 - wall, kick, before / np.hypot(before, beside)]
 
 
 def remains(scene: Scene, legs: Array, disks: Sequence[int], end: float) -> Iterator[str]:

@@ -79,17 +79,14 @@ class Wall(NamedTuple):
 
 
 def dot(p: Vector, q: Vector) -> Number:
-    """The scalar product."""
     return p.real * q.real + p.imag * q.imag
 
 
 def exact(p: Sequence[float]) -> Vector:
-    """Two floats as what they are, without rounding."""
     return mpc(mpfr(float(p[0])), mpfr(float(p[1])))
 
 
 def value(p: Polynomial, t: Number) -> Number:
-    """p at t, by Horner's rule."""
     total = mpfr(0)
     for c in reversed(p):
         total = total * t + c
@@ -97,7 +94,6 @@ def value(p: Polynomial, t: Number) -> Number:
 
 
 def derivative(p: Polynomial) -> Polynomial:
-    """p', a degree lower."""
     return [c * k for k, c in enumerate(p)][1:]
 
 
@@ -136,7 +132,6 @@ def root(p: Polynomial, low: Number, high: Number) -> Number:
 
 
 def first_fall(p: Polynomial, until: Number) -> Number | None:
-    """The first t in (0, until] at which p falls through 0, or None."""
     lowest, power = p[0], until
     for c in p[1:]:
         lowest, power = lowest - abs(c) * power, power * until
@@ -161,17 +156,14 @@ def distance_squared(p: Disk, q: Disk) -> Polynomial:
 
 
 def height(p: Disk, point: Vector, normal: Vector, least: Number) -> Polynomial:
-    """How far the centre is along `normal` from the line through `point`, less `least`."""
     return [dot(p.x - point, normal) - least, dot(p.v, normal), dot(p.a, normal) / 2]
 
 
 def flown(p: Disk, t: Number) -> Disk:
-    """The disk `t` s later."""
     return p._replace(x=p.x + p.v * t + p.a * (t * t / 2), v=p.v + p.a * t)
 
 
 def walls_of(scene: Scene) -> list[Wall]:
-    """Its walls as what they are, without rounding."""
     walls = []
     for start, end in ((exact(start), exact(end)) for start, end in scene.walls):
         along = end - start
@@ -253,7 +245,6 @@ class Motion:
         self.end = self.now
 
     def follow(self, scenario: Scenario, most: int, nudge: Sequence[tuple[Vector, Vector]]) -> None:
-        """From thrust to thrust, and between them from event to event."""
         scene, stop = scenario.scene, mpfr(scenario.duration)
         walls = walls_of(scene)
         sizes = [(mpfr(float(r)), 1 / mpfr(float(m))) for r, m in zip(scene.radius, scene.mass)]
@@ -286,8 +277,6 @@ class Motion:
                         raise Stop("enough events")
 
     def collide(self, disks: list[Disk], found: Found, restitution: Number) -> None:
-        """An impulse along the line of centres turns the closing speed around: Newton's law of
-        restitution."""
         i, j, p = found.i, found.j, disks[found.i]
         q = disks[j] if j >= 0 else found.other
         assert q is not None
@@ -303,15 +292,12 @@ class Motion:
         self.events.append(Event(self.now, i, j, impulse, closing / gmpy2.sqrt(dot(v, v))))
 
     def at(self, t: float) -> list[Disk]:
-        """The disks at `t` s."""
         with gmpy2.context(precision=BITS):
             k = bisect_right(self.times, mpfr(t)) - 1
             return [flown(disk, mpfr(t) - self.times[k]) for disk in self.states[k]]
 
 
 def acceleration(scene: Scene, thrusts: Sequence[Thrust], i: int, now: Number) -> Vector:
-    """m/s2 of disk i by gravity and by the thrusts that are on, which must be in the world's
-    axes."""
     if scene.static[i]:
         return mpc(0)
     assert all(thrust.frame == "world" for thrust in thrusts)

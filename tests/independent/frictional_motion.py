@@ -26,7 +26,6 @@ class Motion(NamedTuple):
 
 
 def first_fall(gap: Array) -> float:
-    """First t > 0 at which a polynomial, highest power first, comes down through 0."""
     gap = np.trim_zeros(np.atleast_1d(gap), "f")
     roots = np.roots(gap) if len(gap) > 1 else np.zeros(0)
     times = roots[np.abs(roots.imag) < 1e-10].real

@@ -60,7 +60,6 @@ def across(scene: Scene, x: float, y: float) -> tuple[float, float] | None:
 def sampled(
     scenario: Scenario, dt: float, step: Callable[[int], None], read: Callable[[], list[Row]]
 ) -> Samples:
-    """Play all steps, and read where a sample is due."""
     rows = [read()]
     substeps = round(scenario.sample_interval / dt)
     for k in range(scenario.intervals):
@@ -72,7 +71,6 @@ def sampled(
 
 
 def play_pymunk(scenario: Scenario, dt: float, asked: dict[str, Any]) -> Samples:
-    """pymunk: a space, a body a disk, circles and segments."""
     scene, space = scenario.scene, pymunk.Space()
     space.gravity = tuple(scene.gravity.tolist())
     for name in (
@@ -201,7 +199,6 @@ def play_box2d(scenario: Scenario, dt: float, asked: dict[str, Any]) -> Samples:
 
 
 def play_box2d_v3(scenario: Scenario, dt: float, asked: dict[str, Any]) -> Samples:
-    """Box2D 3.1 by pyb2d3: a body a disk, all walls as segments."""
     scene, world_of = scenario.scene, {"gravity": tuple(scenario.scene.gravity.tolist())}
     if "restitution threshold in m/s" in asked:
         world_of["restitution_threshold"] = asked["restitution threshold in m/s"]
@@ -218,7 +215,6 @@ def play_box2d_v3(scenario: Scenario, dt: float, asked: dict[str, Any]) -> Sampl
 def played_box2d_v3(
     scene: Scene, scenario: Scenario, dt: float, asked: dict[str, Any], world: Any
 ) -> Samples:
-    """In a world that is made."""
     sleeping = asked.get("sleeping", True)
     world.sleeping_enabled = sleeping
     world.continuous_enabled = asked.get("continuous collision", True)

@@ -45,12 +45,10 @@ def random_scene(seed: int) -> Scenario:
 
 
 def scenario(name: str, scene: Scene, duration: float, thrusts: list[Thrust]) -> Scenario:
-    """The scene as a scenario without an answer."""
     return Scenario(name, "?", "random (seed n)", scene, duration, duration / 16, thrusts=thrusts)
 
 
 def box(_rng: np.random.Generator) -> tuple[np.ndarray, None]:
-    """Four walls that meet at their ends."""
     corners = np.array([[0, 0], [WIDTH, 0], [WIDTH, HEIGHT], [0, HEIGHT]])
     return np.stack([corners, np.roll(corners, -1, axis=0)], axis=1), None
 
@@ -70,7 +68,6 @@ def cluttered_box(rng: np.random.Generator) -> tuple[np.ndarray, None]:
 
 
 def wrap(_rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """The exercise's box, without walls."""
     return np.zeros((0, 2, 2)), np.array([[0, 0], [WIDTH, HEIGHT]])
 
 
@@ -91,7 +88,6 @@ def placed(rng: np.random.Generator, radius: np.ndarray, walls: np.ndarray) -> n
 
 
 def distance_to_segment(x: np.ndarray, start: np.ndarray, end: np.ndarray) -> float:
-    """m."""
     along = end - start
     share = np.clip((x - start) @ along / (along @ along), 0, 1)
     return float(np.hypot(*(x - start - share * along)))

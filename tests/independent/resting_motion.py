@@ -47,7 +47,6 @@ class Ball(NamedTuple):
 
 
 def clamp(x: mpfr, most: mpfr) -> mpfr:
-    """x, limited to `most` either way."""
     return max(-most, min(most, x))
 
 
@@ -198,7 +197,6 @@ def column(scene: Scene, times: Array, order: np.random.Generator) -> Array:
 
 
 def heights(legs: list[Leg], t: mpfr, g: mpfr) -> list[float]:
-    """(n,) m, of a column at `t` s."""
     at, y, v, lies = [leg for leg in legs if leg[0] <= t][-1]
     s = t - at
     return [float(a if rests else a + b * s - g * s * s / 2) for a, b, rests in zip(y, v, lies)]

@@ -45,7 +45,6 @@ NAMES = ("position", "velocity", "angle", "angular_velocity")
 
 
 def by_the_adapter(engine: str, scenario: Scenario) -> tuple[Run, dict[str, Any]]:
-    """Its run at the second step size, and the settings that it asked the engine for."""
     made = ENGINES[engine].make()
     run = play(made, engine, scenario, scenario.dt(scenario.substeps[1]))
     made.close()
@@ -53,7 +52,6 @@ def by_the_adapter(engine: str, scenario: Scenario) -> tuple[Run, dict[str, Any]
 
 
 def unequal(run: Run, samples: Samples) -> list[str]:
-    """Which of the four arrays are not the same, bit for bit, and by how much."""
     assert run.trajectory is not None
     pairs = zip(NAMES, (getattr(run.trajectory, name) for name in NAMES), samples)
     return [
@@ -65,7 +63,7 @@ def unequal(run: Run, samples: Samples) -> list[str]:
 def test_an_adapter_plays_what_its_engine_plays_when_called_directly(
     engine: str, record_property: Record
 ):
-    """Bit for bit, with the settings that it says it asked for, and no others."""
+    # with the settings that it says it asked for, and no others
     wrong, played = [], 0
     for name in SCENES:
         scenario = catalogue.scenario(name)
@@ -100,7 +98,6 @@ def test_an_adapter_plays_what_its_engine_plays_when_called_directly(
 def test_a_setting_that_is_not_the_one_recorded_is_noticed(
     engine: str, scene: str, setting: str, value: Any
 ):
-    """So the record of settings is what was played with."""
     scenario = catalogue.scenario(scene)
     run, asked = by_the_adapter(engine, scenario)
     plain = PLAIN[run.engine]

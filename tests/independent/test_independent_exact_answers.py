@@ -46,7 +46,6 @@ class Compared:
 
 
 def compared(scenario: Scenario, motion: Motion, record: TruthRecord) -> Compared:
-    """Both up to the end of either."""
     faults = []
     if record.horizon < float(motion.end) - (NEAR if motion.reason == "accumulation" else ACCURACY):
         faults.append(
@@ -100,7 +99,6 @@ def compared(scenario: Scenario, motion: Motion, record: TruthRecord) -> Compare
 def test_the_oracle_gives_the_events_and_positions_of_a_motion_that_asks_all_pairs(
     record_property: Record, seeds: range
 ):
-    """Of hundreds of random scenes; and it never ends before that motion does."""
     found, ends, refused = [], Counter(), []
     for seed in seeds:
         scenario = random_scene(seed)
@@ -129,7 +127,6 @@ def test_the_oracle_gives_the_events_and_positions_of_a_motion_that_asks_all_pai
 
 
 def test_every_restitution_meets_all_surroundings():
-    """And some scenes have gravity, thrusts, static disks, or none of them."""
     scenes = [random_scene(seed) for seed in range(SCENES)]
     met = {(s.scene.restitution, s.name.split("-")[0]) for s in scenes}
 
@@ -144,8 +141,8 @@ def test_every_restitution_meets_all_surroundings():
 
 @pytest.mark.parametrize("seed", [4, 21])
 def test_a_record_that_is_wrong_in_one_thing_is_noticed(seed: int):
-    """An event dropped, spurious, 2e-12 s late or of another pair; a disk off by 2e-12 m; an end
-    that is too early."""
+    # an event dropped, spurious, 2e-12 s late or of another pair; a disk off by 2e-12 m; an end
+    # that is too early
     scenario = random_scene(seed)
     motion, record = Motion(scenario, MOST_EVENTS), computed(scenario)
     assert len(record.events) > 5

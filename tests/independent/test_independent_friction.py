@@ -17,12 +17,10 @@ STEPS = 4000
 
 
 def asked(scene: Scene, until: float) -> Scenario:
-    """The scene for so many s."""
     return Scenario("asked", "?", "", scene, until, until)
 
 
 def exact(scene: Scene, until: float) -> Trajectory:
-    """The oracle's answer at 0 and at `until` s, as far as it goes."""
     record = replace(computed(asked(scene, until)), float64_horizon=np.inf)
     return record.sampled(scene, (), np.array([0.0, until]))
 
@@ -40,8 +38,7 @@ def largest_difference(found: Motion, truth: Trajectory) -> float:
 
 
 def compare_flying(seed: int) -> int:
-    """Compare a scene of `flying` after some collisions; how many there were, or -1 where the
-    oracle ends before."""
+    """How many collisions were compared, or -1 where the oracle ends before."""
     scene = flying(seed)
     found = collisions(scene, MOST, 3.0)
     truth = exact(scene, found.t)
@@ -54,7 +51,6 @@ def compare_flying(seed: int) -> int:
 
 
 def compare_lying(seed: int) -> None:
-    """Compare a scene of `lying` after a second."""
     scene = lying(seed)
     truth = exact(scene, 1.0)
     place, v, spin = sliding(scene, 1.0, STEPS)
@@ -69,7 +65,6 @@ def compare_lying(seed: int) -> None:
 
 
 def compare_all(count: int) -> None:
-    """Half of them fly, half lie; most that fly must be comparable, and collide."""
     met = [compare_flying(seed) for seed in range(count // 2)]
     for seed in range(count // 2):
         compare_lying(seed)
@@ -81,13 +76,11 @@ def compare_all(count: int) -> None:
 
 
 def test_exact_answers_with_friction_are_those_of_plain_methods():
-    """Twenty random scenes."""
     compare_all(20)
 
 
 @pytest.mark.independent
 def test_two_hundred_exact_answers_with_friction_are_those_of_plain_methods():
-    """And two hundred."""
     compare_all(200)
 
 
@@ -95,7 +88,6 @@ def test_two_hundred_exact_answers_with_friction_are_those_of_plain_methods():
     "change", [dict(friction=0.101), dict(inertia=1.01), dict(restitution=0.89)]
 )
 def test_a_slightly_wrong_law_of_friction_would_be_seen(change: dict[str, float]):
-    """Negative control: a per cent of friction, inertia or restitution."""
     scene = next(
         one for one in map(flying, range(99)) if one.friction == 0.1 and one.restitution == 0.9
     )

@@ -43,7 +43,6 @@ GASES, SUITE = 8, ("asteroids", "falling_box")
 
 
 def gas(seed: int) -> Scenario:
-    """Ten disks in a box; e = 1 and 0.9 in turn, and every other pair of scenes falls."""
     rng = np.random.default_rng(1000 + seed)
     radius = rng.uniform(0.25, 0.45, 10)
     walls, _ = box(rng)
@@ -60,8 +59,6 @@ def gas(seed: int) -> Scenario:
 
 
 def nudges(scene: Scene, rng: np.random.Generator) -> list[tuple[Vector, Vector]]:
-    """A rounding of the largest coordinate and speed, up or down, for each of the four numbers of a
-    moving disk."""
     length, speed = EPS * np.abs(scene.position).max(), EPS * np.abs(scene.velocity).max()
     signs = rng.choice([-1, 1], (scene.n, 4)) * ~scene.static[:, None]
     return [(mpc(*map(float, s[:2] * length)), mpc(*map(float, s[2:] * speed))) for s in signs]
@@ -85,7 +82,6 @@ def distances(one: Scenario, end: float, samples: int, seed: int) -> tuple[np.nd
 
 
 def verdict(times: np.ndarray, distance: np.ndarray, horizon: float) -> str:
-    """What is wrong with a horizon, in s, or ""."""
     at, before = float(np.interp(horizon, times, distance)), distance[times <= horizon].max()
     if before > MOST * BILLIONTH:
         return f"too late: starts are {before:.2g} radii apart before it"
@@ -93,7 +89,6 @@ def verdict(times: np.ndarray, distance: np.ndarray, horizon: float) -> str:
 
 
 def crossing(times: np.ndarray, distance: np.ndarray) -> float:
-    """s, when the samples first are a billionth of a radius apart; inf if they never are."""
     late = np.flatnonzero(distance > BILLIONTH)
     return float(times[late[0]]) if len(late) else np.inf
 
@@ -114,10 +109,7 @@ def mean_square(gases: list[tuple[np.ndarray, np.ndarray, float]], share: float)
 def test_at_the_horizon_starts_a_rounding_apart_are_a_billionth_of_a_radius_apart(
     record_property: Record, gases: int, suite: tuple[str, ...]
 ):
-    """Of gases with and without gravity and losses, and of two scenes of the suite.
-
-    The controls: horizons that are all a tenth longer, or shorter.
-    """
+    # The controls: horizons that are all a tenth longer, or shorter.
     scenes = [gas(seed) for seed in range(gases)] + [catalogue.scenario(name) for name in suite]
     lines, found, wrong = [], [], []
     for seed, one in enumerate(scenes):

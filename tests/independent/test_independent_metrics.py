@@ -63,7 +63,6 @@ WITH = {
 
 
 def norm(a: np.ndarray) -> np.ndarray:
-    """Length of the vectors along the last axis."""
     return np.sqrt((a**2).sum(axis=-1))
 
 
@@ -77,23 +76,18 @@ def distance(one: Trajectory, other: Trajectory, scenario: Scenario) -> np.ndarr
 
 
 def radii(one: Trajectory, other: Trajectory, scenario: Scenario) -> np.ndarray:
-    """(k, n) in radii of each disk."""
     return distance(one, other, scenario) / scenario.scene.radius
 
 
 def turn(one: Trajectory, other: Trajectory, _: Scenario) -> np.ndarray:
-    """(k, n) rad."""
     return np.abs(one.angle - other.angle)
 
 
 def largest(of: Callable[..., np.ndarray]) -> Callable[..., float]:
-    """The largest of all disks and samples."""
     return lambda *given: float(of(*given).max())
 
 
 def root_mean_square(of: Callable[..., np.ndarray]) -> Callable[..., float]:
-    """Over the disks that can move, and samples; those of infinite mass cannot."""
-
     def mean(one: Trajectory, other: Trajectory, scenario: Scenario) -> float:
         off = of(one, other, scenario)
         squares = [
@@ -105,7 +99,6 @@ def root_mean_square(of: Callable[..., np.ndarray]) -> Callable[..., float]:
 
 
 def time_to_1pct(one: Trajectory, other: Trajectory, scenario: Scenario) -> float:
-    """The time of the first sample with a disk more than 1 % of its radius off."""
     off = (radii(one, other, scenario) > 0.01).any(axis=1)
     return float(one.t[off.argmax()]) if off.any() else np.inf
 
@@ -116,12 +109,10 @@ def moving(scenario: Scenario) -> np.ndarray:
 
 
 def alone(scenario: Scenario) -> bool:
-    """Whether nothing but gravity and thrusts acts on the disks from outside."""
     return not len(scenario.scene.walls) and not scenario.scene.static.any()
 
 
 def on_for(scenario: Scenario, t: np.ndarray) -> list[np.ndarray]:
-    """For each thrust, (k,) s, how long it has been on."""
     return [np.clip(t, thrust.start, thrust.stop) - thrust.start for thrust in scenario.thrusts]
 
 
@@ -199,7 +190,6 @@ def energy_created(one: Trajectory, _: None, scenario: Scenario) -> float | None
 
 
 def penetration(one: Trajectory, _: None, scenario: Scenario) -> float:
-    """Of disks and disks, and of disks and walls."""
     scene, deepest = scenario.scene, 0.0
     for i in range(scene.n):
         for j in range(i + 1, scene.n):
@@ -308,7 +298,6 @@ OWN: dict[str, Callable[..., float | None]] = {
 def differences(
     table: pd.DataFrame, known: dict[str, Trajectory], scenario: Scenario
 ) -> tuple[int, list[str]]:
-    """How many rows of a table were computed again, and those that came out otherwise."""
     count, wrong = 0, []
     for row in table[table.metric.isin(OWN)].itertuples():
         one, other = known[f"{row.engine}:{row.profile}"], known.get(row.versus)
@@ -328,13 +317,11 @@ def differences(
 
 
 def first(trajectory: Trajectory, k: int) -> Trajectory:
-    """The first k samples: a truth may end before a run."""
     names = ("t", "position", "velocity", "angle", "angular_velocity")
     return replace(trajectory, **{name: getattr(trajectory, name)[:k] for name in names})
 
 
 def compared(name: str) -> tuple[pd.DataFrame, dict[str, Trajectory], Scenario]:
-    """The table of a scene at its second step size, and what it was made from."""
     scenario = catalogue.scenario(name)
     runs = [
         play(ENGINES[engine].make(), engine, scenario, scenario.dt(scenario.substeps[1]))
@@ -346,7 +333,6 @@ def compared(name: str) -> tuple[pd.DataFrame, dict[str, Trajectory], Scenario]:
 
 
 def test_the_metrics_come_out_again_from_the_trajectories(record_property: Record):
-    """To rounding; every metric of `OWN` in some scene."""
     count, wrong, met = 0, [], set()
     for name in SCENES:
         table, known, scenario = compared(name)
@@ -364,7 +350,6 @@ def test_the_metrics_come_out_again_from_the_trajectories(record_property: Recor
 
 @pytest.mark.parametrize("metric", OWN)
 def test_a_metric_that_is_off_by_a_millionth_is_noticed(metric: str):
-    """Of any metric that is computed again."""
     table, known, scenario = compared(WITH.get(metric, "oblique_e09"))
     count, wrong = differences(table, known, scenario)
     table.loc[table.metric == metric, "value"] = table.value * (1 + 1e-6) + 1e-6

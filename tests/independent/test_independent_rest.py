@@ -17,7 +17,6 @@ UNKNOWN = ("order of", "orders than", "do not end", "used up their digits")
 
 
 def slope_scene(seed: int) -> tuple[Scene, float]:
-    """A ball above a slope, or above a level floor, with friction or none; and its duration, s."""
     draw = np.random.default_rng([39, seed])
     angle = draw.uniform(-0.6, 0.6) * (draw.random() < 0.8)
     along, up = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
@@ -40,7 +39,6 @@ def slope_scene(seed: int) -> tuple[Scene, float]:
 
 
 def column_scene(seed: int) -> Scene:
-    """One to four disks above each other, at e = 0 or little."""
     draw = np.random.default_rng([40, seed])
     n = int(draw.integers(1, 5))
     radius, gaps = draw.uniform(0.05, 0.4, n), draw.uniform(0.05, 0.6, n)
@@ -58,13 +56,11 @@ def column_scene(seed: int) -> Scene:
 
 
 def asked(scene: Scene, duration: float) -> Scenario:
-    """A scenario of this scene."""
     return Scenario("rest", "?", "random", scene, duration, duration / 40)
 
 
 @pytest.mark.parametrize("count", [30, MANY])
 def test_balls_on_slopes_end_as_in_the_plain_motion(count: int):
-    """Bounces, slides, rolls: all to the end, to 1e-11 m and 1e-11 / s."""
     for seed in range(count):
         scene, duration = slope_scene(seed)
         one = asked(scene, duration)
@@ -88,8 +84,8 @@ def test_balls_on_slopes_end_as_in_the_plain_motion(count: int):
 
 @pytest.mark.parametrize("count", [20, pytest.param(50, marks=pytest.mark.long)])
 def test_balls_on_slopes_in_small_steps_are_as_near_as_their_step(count: int):
-    """c dt, c = 10 (1 + e) / (1 - e) (v + g T) m/s: each bounce is late by up to a step, at (1 + e)
-    of its speed, and a step of gravity is g T dt / 2."""
+    # c dt, c = 10 (1 + e) / (1 - e) (v + g T) m/s: each bounce is late by up to a step, at (1 + e)
+    # of its speed, and a step of gravity is g T dt / 2.
     for seed in range(count):
         scene, duration = slope_scene(seed)
         one = asked(scene, duration)
@@ -105,11 +101,8 @@ def test_balls_on_slopes_in_small_steps_are_as_near_as_their_step(count: int):
 
 @pytest.mark.parametrize("count", [20, pytest.param(200, marks=pytest.mark.long)])
 def test_columns_come_to_rest_as_in_the_plain_motion(count: int):
-    """Heights to 1e-11 m up to the horizon. An answer ends only where the order of collisions may
-    decide, or is not known not to; four of five last to the end.
-
-    The plain motion does not get past a collapse in flight: at most 1 column in 50 has one.
-    """
+    # An answer ends only where the order of collisions may decide, or is not known not to; four of
+    # five last to the end.
     ended, cut_short = 0, list[int]()
     for seed in range(count):
         scene = column_scene(seed)

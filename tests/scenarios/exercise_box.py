@@ -21,8 +21,8 @@ def boxed(seed: int, restitution: float = 1.0, gravity: float = 0.0) -> Scene:
     position = scatter(rng, (LOW + room).tolist(), (HIGH - room).tolist(), radius, first=SHIP)
     velocity = rng.uniform(0.25, 0.5, (COUNT, 2)) * rng.choice([-1.0, 1.0], (COUNT, 2))
     return lay_out(
-        position=position,
-        velocity=np.vstack([[0.0, 0.0], velocity]),
+        position,
+        np.vstack([[0.0, 0.0], velocity]),
         radius=radius,
         mass=np.append(SHIP_MASS, 30 * np.pi * size**2),
         restitution=restitution,
@@ -32,5 +32,4 @@ def boxed(seed: int, restitution: float = 1.0, gravity: float = 0.0) -> Scene:
 
 
 def lasting(scene: Scene, duration: float) -> Scenario:
-    """The question what becomes of it in that time, s."""
     return Scenario("boxed", "?", "the exercise between walls", scene, duration, duration / 100)

@@ -25,12 +25,10 @@ MOST_TRIES = 500
 
 
 def random_scenarios(count: int, seed: int = 0) -> list[Scenario]:
-    """So many scenarios of 1 to 3 s with 1 to 6 disks, without truths."""
     return [random_scenario(seed, number) for number in range(count)]
 
 
 def random_scenario(seed: int, number: int) -> Scenario:
-    """The scenario of this number: its layout goes round, all else is random."""
     draw = np.random.default_rng([seed, number])
     layout = list(LAYOUTS)[number % len(LAYOUTS)]
     walls = LAYOUTS[layout](draw)
@@ -68,7 +66,6 @@ def random_scenario(seed: int, number: int) -> Scenario:
 
 
 def gravity(draw: Draw) -> Array:
-    """(2,) m/s2: none, straight down, or anywhere."""
     kind, angle = draw.random(), draw.uniform(0, 2 * np.pi)
     if kind < 0.25:
         return np.zeros(2)
@@ -78,7 +75,6 @@ def gravity(draw: Draw) -> Array:
 
 
 def thrusts(draw: Draw, mass: Array, duration: float) -> list[Thrust]:
-    """None in every other scene, else up to three, on at whole samples; some last to the end."""
     samples, found = round(duration / INTERVAL), []
     for _ in range(int(draw.integers(1, 4)) * int(draw.random() < 0.5)):
         disk = int(draw.choice(np.flatnonzero(np.isfinite(mass))))
@@ -90,7 +86,6 @@ def thrusts(draw: Draw, mass: Array, duration: float) -> list[Thrust]:
 
 
 def scattered(draw: Draw, walls: Array, count: int) -> tuple[Array, Array]:
-    """Centres (n, 2) m and radii (n,) m of up to `count` disks that touch nothing; one at least."""
     centres, radii = list[Array](), list[float]()
     for _ in range(MOST_TRIES):
         centre, radius = draw.uniform(-1.3, 1.3, 2), draw.uniform(0.08, 0.3)
@@ -119,7 +114,6 @@ def lattice(draw: Draw, _walls: Array, count: int) -> tuple[Array, Array]:
 
 
 def distances(point: Array, walls: Array) -> list[float]:
-    """m from a point to each wall."""
     start, along = walls[:, 0], walls[:, 1] - walls[:, 0]
     share = np.clip(((point - start) * along).sum(axis=1) / (along**2).sum(axis=1), 0, 1)
     return np.hypot(*(point - start - share[:, None] * along).T).tolist()
@@ -129,17 +123,14 @@ CORNER = (-1.5, -1.25)
 
 
 def toward(angle: Array | float) -> Array:
-    """(..., 2), the unit vector at an angle, rad."""
     return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
 
 
 def ring(corners: Array) -> Array:
-    """The walls around these corners."""
     return np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
 
 
 def upright_box(_draw: Draw) -> Array:
-    """Right angles, exactly."""
     return box(CORNER, (1.75, 1.5))
 
 
@@ -151,7 +142,6 @@ def tilted_box(draw: Draw) -> Array:
 
 
 def triangle(draw: Draw) -> Array:
-    """Three corners, most of them acute."""
     return ring(
         2.2
         * toward(
@@ -161,13 +151,11 @@ def triangle(draw: Draw) -> Array:
 
 
 def floor(draw: Draw) -> Array:
-    """Level, or an incline."""
     along = toward(draw.choice([0.0, draw.uniform(-0.6, 0.6)]))
     return np.array([[[0.0, -1.4] - 3 * along, [0.0, -1.4] + 3 * along]])
 
 
 def crossing(draw: Draw) -> Array:
-    """Two walls through one place, at right angles every other time."""
     one = draw.uniform(0, np.pi)
     other = one + draw.choice([np.pi / 2, draw.uniform(0.3, 2.8)])
     place = draw.uniform(-0.4, 0.4, 2)
@@ -177,19 +165,16 @@ def crossing(draw: Draw) -> Array:
 
 
 def wedge(draw: Draw) -> Array:
-    """Two walls that end in one point and open upward, or anywhere."""
     middle = draw.choice([np.pi / 2, draw.uniform(0, 2 * np.pi)])
     half, tip = draw.uniform(0.15, 1.4), -1.2 * toward(middle)
     return np.array([[tip, tip + 3 * toward(middle + side)] for side in (half, -half)])
 
 
 def loose(draw: Draw) -> Array:
-    """Some walls anywhere, with ends to meet."""
     return draw.uniform(-1.6, 1.6, (int(draw.integers(2, 5)), 2, 2))
 
 
 def nothing(_draw: Draw) -> Array:
-    """No walls."""
     return np.zeros((0, 2, 2))
 
 

@@ -23,7 +23,6 @@ MODELS = {name: answered_by(scenario(name)) for name in SCENARIOS}
 
 
 def never(*_: object) -> None:
-    """Stands for the oracle where it must not be asked."""
     raise AssertionError("computed by events")
 
 
@@ -31,7 +30,6 @@ def never(*_: object) -> None:
 def test_a_scene_that_names_a_closed_form_is_answered_without_following_a_collision(
     name: str, monkeypatch: pytest.MonkeyPatch
 ):
-    """Neither computed nor looked up."""
     monkeypatch.setattr(oracle, "computed", never)
     monkeypatch.setattr(oracle, "look_up", never)
     one = scenario(name)
@@ -41,7 +39,6 @@ def test_a_scene_that_names_a_closed_form_is_answered_without_following_a_collis
 
 
 def test_a_scene_that_is_computed_by_events_says_so(monkeypatch: pytest.MonkeyPatch):
-    """Negative control: there the oracle is asked, and there are such scenes."""
     monkeypatch.setattr(oracle, "look_up", never)
     by_events = [name for name, model in MODELS.items() if model == EVENT_DRIVEN]
 
@@ -54,7 +51,6 @@ def test_a_scene_that_is_computed_by_events_says_so(monkeypatch: pytest.MonkeyPa
 
 
 def test_every_scene_names_a_model():
-    """Those without an answer are none of this catalogue."""
     assert NOTHING not in MODELS.values()
 
 
@@ -62,7 +58,6 @@ def test_every_scene_names_a_model():
     "name", ["head_on_unequal_e09", "bouncing_ball_e1", "cradle_with_gaps", "line_gas"]
 )
 def test_the_closed_form_is_cheaper_than_following_the_collisions(name: str):
-    """It calls less than half as many functions, counted rather than timed."""
     one = scenario(name)
     assert one.truth is not None
 

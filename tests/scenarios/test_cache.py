@@ -21,14 +21,12 @@ from crosscheck2d.scenarios.truth.exact import OracleTruth, TruthRecord
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty cache folder."""
     monkeypatch.setenv("CROSSCHECK_CACHE", str(tmp_path / "cache"))
     return tmp_path / "cache"
 
 
 @pytest.fixture
 def made(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """The names of the scenarios that are computed, not read."""
     names: list[str] = []
     real = oracle.computed
 
@@ -41,7 +39,6 @@ def made(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 
 def record_of(one: Scenario) -> TruthRecord:
-    """Its record by way of the cache."""
     return OracleTruth(one).record()
 
 
@@ -49,8 +46,6 @@ ONE = scenario("oblique_e09")
 
 
 def test_a_record_is_computed_once(folder: Path, made: list[str]):
-    """The second time it is read, the same to the bit; nothing but the record lies in the
-    folder."""
     first, second = record_of(ONE), record_of(ONE)
 
     assert made == [ONE.name]
@@ -85,7 +80,6 @@ def test_a_file_that_is_no_cache_is_one_sentence_and_stays(folder: Path, made: l
 
 
 def test_what_decides_the_answer_decides_the_key():
-    """Duration, scene and thrusts; not the name, the question or the ladder."""
     keys = {
         truth_cache.key_of(one, False)
         for one in (
@@ -103,7 +97,6 @@ def test_what_decides_the_answer_decides_the_key():
 
 
 def test_with_friction_every_field_of_a_scene_decides_the_key():
-    """The angle, too: the record holds the rotation from it on."""
     rough = replace(ONE.scene, friction=0.25)
     lines = {"walls": [[[-9.0, -9.0], [9.0, -9.0]]], "wrap": [[-9.0, -9.0], [9.0, 9.0]]}
     names = [field.name for field in fields(Scene)]
@@ -117,7 +110,6 @@ def test_with_friction_every_field_of_a_scene_decides_the_key():
 
 
 def test_many_writers_leave_one_whole_record(folder: Path):
-    """Threads that write the same record at once."""
     with ThreadPoolExecutor(8) as pool:
         records = list(pool.map(record_of, [ONE] * 16))
 
@@ -126,7 +118,6 @@ def test_many_writers_leave_one_whole_record(folder: Path):
 
 
 def test_without_a_home_there_is_no_cache(monkeypatch: pytest.MonkeyPatch, made: list[str]):
-    """No folder, no failure."""
     for name in ("CROSSCHECK_CACHE", "XDG_CACHE_HOME", "HOME"):
         monkeypatch.delenv(name, raising=False)
 
@@ -140,7 +131,6 @@ def test_without_a_home_there_is_no_cache(monkeypatch: pytest.MonkeyPatch, made:
 
 
 def test_a_folder_that_cannot_be_written_to_is_no_cache(folder: Path, made: list[str]):
-    """A file stands where the folder should; or it is read-only, which root does not mind."""
     folder.write_text("in the way")
     record_of(ONE)
     assert len(made) == 1
@@ -152,7 +142,6 @@ def test_a_folder_that_cannot_be_written_to_is_no_cache(folder: Path, made: list
 
 
 def test_the_folder_follows_the_platform(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
-    """$CROSSCHECK_CACHE before $XDG_CACHE_HOME before ~/.cache."""
     monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.delenv("CROSSCHECK_CACHE", raising=False)
     monkeypatch.delenv("XDG_CACHE_HOME", raising=False)

@@ -21,7 +21,6 @@ MOVING = [name for name in ANSWERED if name not in (*RANDOM, *RESTING)]
 
 
 def smallest_gap(scene, position):
-    """The smallest gap (k,) m of disk to disk or wall, at each of the positions (k, n, 2)."""
     a, b = np.triu_indices(scene.n, 1)
     apart = (
         np.hypot(*np.moveaxis(position[:, a] - position[:, b], -1, 0))
@@ -37,7 +36,6 @@ def smallest_gap(scene, position):
 
 
 def test_there_are_at_least_24_and_each_is_listed_under_its_own_name():
-    """The catalogue is keyed by `Scenario.name`."""
     assert len(SCENARIOS) >= 24
     assert [scenario(name).name for name in SCENARIOS] == list(SCENARIOS)
     assert set(SCENARIOS) >= RANDOM
@@ -45,7 +43,6 @@ def test_there_are_at_least_24_and_each_is_listed_under_its_own_name():
 
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_scenario_asks_one_question_and_has_a_truth_or_a_reason_for_none(name):
-    """Its question can stand under a chart, and its ladder runs from coarse to fine."""
     run = scenario(name)
     assert run.asks.endswith("?")
     assert run.asks.count("?") == 1
@@ -56,7 +53,6 @@ def test_scenario_asks_one_question_and_has_a_truth_or_a_reason_for_none(name):
 
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_nothing_overlaps_at_the_start_and_all_is_on_the_page(name):
-    """No engine begins by correcting overlaps."""
     scene = scenario(name).scene
     # A unit in the last place of the coordinates: touching disks touch to rounding.
     assert smallest_gap(scene, scene.position[None])[0] >= -1e-15
@@ -68,7 +64,6 @@ def test_nothing_overlaps_at_the_start_and_all_is_on_the_page(name):
 
 @pytest.mark.parametrize("name", ANSWERED)
 def test_truth_starts_as_the_scene(name):
-    """At t = 0 the truth is the initial state."""
     run = scenario(name)
     state, start = run.truth(run.times).at(0), run.scene.state
     for field in ("position", "velocity", "angle", "angular_velocity"):
@@ -79,7 +74,6 @@ def test_truth_starts_as_the_scene(name):
 
 @pytest.mark.parametrize("name", ANSWERED)
 def test_truth_has_one_state_a_sample_up_to_its_horizon(name):
-    """All arrays have the shapes of `Trajectory`; no collision lies beyond the last sample."""
     run = scenario(name)
     truth, n = run.truth(run.times), run.scene.n
     k = int((run.times <= truth.horizon).sum())
@@ -101,7 +95,6 @@ def test_truth_has_one_state_a_sample_up_to_its_horizon(name):
 
 @pytest.mark.parametrize("name", ANSWERED)
 def test_truth_never_penetrates(name):
-    """No sample of a truth has disks or walls inside each other."""
     run = scenario(name)
     truth = run.truth(run.times)
     # The last place of 10 m, and a hundred times that on Galperin's weighted axis.
@@ -110,7 +103,6 @@ def test_truth_never_penetrates(name):
 
 @pytest.mark.parametrize("name", MOVING)
 def test_no_collision_falls_on_a_step(name):
-    """What is measured is late detection at some phase of a step, not the luck of a tie."""
     run = scenario(name)
     collisions = run.truth(run.times).collisions.t
     collisions = collisions[collisions > 0]  # a contact at the start has no phase
@@ -124,7 +116,6 @@ def test_no_collision_falls_on_a_step(name):
 
 @pytest.mark.parametrize("name", ANSWERED)
 def test_thrusts_begin_and_end_at_samples(name):
-    """No step of any dt of the ladder is under a thrust for a part of it only."""
     run = scenario(name)
     for thrust in run.thrusts:
         samples = np.array([thrust.start, thrust.stop]) / run.sample_interval
@@ -134,7 +125,6 @@ def test_thrusts_begin_and_end_at_samples(name):
 
 @pytest.mark.parametrize("name", sorted(RANDOM))
 def test_same_seed_same_scene_and_another_seed_another(name):
-    """A random scene is its seed, bit for bit."""
     one, same, other = scenario(name, 3), scenario(name, 3), scenario(name, 4)
     for field in ("position", "velocity", "angular_velocity", "radius", "mass", "inertia"):
         assert getattr(one.scene, field).tobytes() == getattr(same.scene, field).tobytes()
@@ -143,7 +133,6 @@ def test_same_seed_same_scene_and_another_seed_another(name):
 
 
 def test_other_scenarios_do_not_depend_on_the_seed():
-    """Only what `RANDOM` lists is random."""
     for name in set(SCENARIOS) - RANDOM:
         one, other = scenario(name, 3), scenario(name, 4)
         assert one.seed is None
@@ -151,7 +140,6 @@ def test_other_scenarios_do_not_depend_on_the_seed():
 
 
 def test_asteroids_are_drawn_as_the_exercise_says():
-    """Ranges, masses and inertias are those of the exercise."""
     scene = scenario("asteroids", 7).scene
     size, speed = scene.radius[1:], np.abs(scene.velocity[1:])
     assert scene.n == 21

@@ -116,7 +116,6 @@ def simulate(scene: Scene, until):
 
 @pytest.mark.parametrize("name", FLYING)
 def test_truth_is_what_an_event_by_event_simulation_finds(name):
-    """Same collisions at the same times, same states between them."""
     run, truth, until = exact(name)
     path = simulate(run.scene, until)
     collisions = truth.collisions.t[truth.collisions.t <= until]
@@ -149,7 +148,6 @@ def contact(scene, position, i, j):
 
 @pytest.mark.parametrize("name", FLYING)
 def test_collisions_lie_at_touching_distance_and_their_impulse_is_the_change_of_momentum(name):
-    """Each listed collision is one: contact, restitution, action and reaction."""
     run, truth, until = exact(name)
     scene, collisions = run.scene, truth.collisions
     gravity = np.where(scene.static[:, None], 0.0, scene.gravity)
@@ -175,7 +173,6 @@ def test_collisions_lie_at_touching_distance_and_their_impulse_is_the_change_of_
 
 @pytest.mark.parametrize("name", ANSWERED)
 def test_velocity_is_the_derivative_of_position(name):
-    """So is the angular velocity that of the angle."""
     run, truth, until = exact(name)
     h = 1e-4
     times = np.linspace(0.01, until - 0.01, 301)
@@ -193,7 +190,6 @@ def test_velocity_is_the_derivative_of_position(name):
 
 @pytest.mark.parametrize("name", THRUST)
 def test_velocity_and_spin_change_by_the_thrusts_as_quadrature_has_it(name):
-    """The integral of force and torque over every sample interval, world and body frame."""
     run, truth, _ = exact(name)
     nodes, weights = np.polynomial.legendre.leggauss(8)
     gained, turned = np.zeros_like(truth.velocity), np.zeros_like(truth.angle)
@@ -233,14 +229,13 @@ def test_velocity_and_spin_change_by_the_thrusts_as_quadrature_has_it(name):
     ],
 )
 def test_number_of_collisions(name, count):
-    """Known counts: pi, all pairs of a cradle, ten bounces of 49 balls."""
+    # pi, all pairs of a cradle, ten bounces of 49 balls
     _, truth, _ = exact(name)
     assert len(truth.collisions) == count
 
 
 @pytest.mark.parametrize("name", [name for name in FLYING if scenario(name).scene.restitution == 1])
 def test_energy_is_kept_at_restitution_one(name):
-    """At every sample, to rounding."""
     run, truth, _ = exact(name)
     mass, g = np.where(run.scene.static, 0, run.scene.mass), run.scene.gravity
     kinetic = (mass * (truth.velocity**2).sum(axis=2)).sum(axis=1) / 2
@@ -251,7 +246,6 @@ def test_energy_is_kept_at_restitution_one(name):
 
 @pytest.mark.parametrize("name", [name for name in FLYING if not len(scenario(name).scene.walls)])
 def test_momentum_is_kept_without_walls(name):
-    """At every sample, to rounding, whatever the restitution."""
     run, truth, _ = exact(name)
     if run.scene.static.any() or run.scene.gravity.any():
         pytest.skip("something outside takes momentum up")
@@ -262,7 +256,6 @@ def test_momentum_is_kept_without_walls(name):
 
 @pytest.mark.parametrize("name", ["galperin_3", "galperin_31", "galperin_314"])
 def test_galperin_is_within_its_error_bound_of_rational_arithmetic(name):
-    """Events in exact fractions, all samples."""
     run, truth, _ = exact(name)
     m, r = [Fraction(a) for a in run.scene.mass], [Fraction(a) for a in run.scene.radius]
     x, v = ([Fraction(a) for a in part[:, 0]] for part in (run.scene.position, run.scene.velocity))
@@ -292,7 +285,6 @@ def test_galperin_is_within_its_error_bound_of_rational_arithmetic(name):
 
 
 def test_a_bouncing_ball_rests_from_its_accumulation_point_on():
-    """Exactly at rest, exactly on the floor."""
     run, truth, _ = exact("bouncing_ball_e09")
     height = run.scene.position[0, 1] - run.scene.radius[0]
     rest = np.sqrt(2 * height / 9.81) * 1.9 / 0.1
@@ -305,7 +297,7 @@ def test_a_bouncing_ball_rests_from_its_accumulation_point_on():
 
 
 def test_an_offset_grows_between_static_disks_as_the_horizon_assumes():
-    """The horizon rests on this factor."""
+    # the horizon rests on this factor
     run, truth, _ = exact("disk_between_static_disks")
     scene = run.scene
     along = np.array([0.8, 0.6])
@@ -327,7 +319,6 @@ def test_an_offset_grows_between_static_disks_as_the_horizon_assumes():
 
 
 def test_a_disk_slides_down_the_incline_in_contact_and_does_not_turn():
-    """Gap 0 and speed g sin(alpha) t throughout."""
     run, truth, _ = exact("slide_on_incline")
     point, normal = (a[0] for a in wall_frames(run.scene))
     # A unit in the last place of 10 m.
@@ -337,7 +328,6 @@ def test_a_disk_slides_down_the_incline_in_contact_and_does_not_turn():
 
 
 def test_what_rests_stays():
-    """The truth of an equilibrium is the start."""
     for name in ("rest_on_floor", "column_of_ten"):
         run, truth, _ = exact(name)
         assert (truth.position == run.scene.position).all()

@@ -12,7 +12,7 @@ from crosscheck2d.scenarios.model import Thrust
 from crosscheck2d.scenarios.truth.exact import computed
 from crosscheck2d.scenarios.truth.oracle.clusters import collapse, complementary
 from crosscheck2d.scenarios.truth.oracle.numbers import digits, has_balls, mpfr
-from crosscheck2d.scenarios.truth.oracle.work import TimeLimit, WorkLimit
+from crosscheck2d.scenarios.truth.oracle.path import TimeLimit, WorkLimit
 from crosscheck2d.scenarios.truth.record import CERTIFIED, SEARCHED
 from tests.scenarios.random_scenes import random_scenario
 from tests.scenarios.test_oracle import asked, states
@@ -39,8 +39,7 @@ def column(mass: list[float], gaps: list[float], restitution: float, aside: floa
 @pytest.mark.parametrize("restitution", [0.0, 0.1, 0.3])
 @pytest.mark.parametrize("mass", [[1, 100], [100, 1], [1, 1, 1], [1, 2, 3, 4]])
 def test_a_column_falls_to_rest(mass: list[float], restitution: float, friction: float):
-    """Every disk lies on the one below at the end, and the answer lasts to the end; at e = 0.3 two
-    collisions of three may come so close that rounding decides their order."""
+    # every disk lies on the one below at the end
     one = asked(
         column(mass, [0.1, 0.4, 0.4, 0.4][: len(mass)], restitution, friction=friction), 6.0
     )
@@ -63,23 +62,21 @@ def test_a_column_falls_to_rest(mass: list[float], restitution: float, friction:
     [(0.0, 6.0, CERTIFIED), (0.1, 6.0, SEARCHED), (0.1, 0.2, CERTIFIED)],
 )
 def test_an_answer_that_rests_on_a_search_says_so(restitution: float, duration: float, method: str):
-    """The collapse of four disks at e = 0.1 is searched; at e = 0, or before it, nothing is."""
+    # The collapse of four disks at e = 0.1 is searched; at e = 0, or before it, nothing is.
     scene = column([1, 2, 3, 4], [0.1, 0.4, 0.4, 0.4], restitution)
     assert computed(asked(scene, duration)).method == method
 
 
 def test_a_disk_beside_the_top_of_another_one_is_refused_by_name():
-    """Negative control: not everything that touches lies still."""
     record = computed(asked(column([1, 1], [0.1, 0.4], 0.0, aside=0.01), 3.0))
     assert record.reason.startswith("disk 1 rolls over disk 0 at t = ")
 
 
 def test_a_row_pushed_along_a_floor_moves_as_one_and_stops_pushing():
-    """F / (m1 + m2 + m3) while the thrust acts; the last one is not pushed after that."""
+    # F / (m1 + m2 + m3) while the thrust acts
     row = lay_out(
-        position=[[0, 0.5], [1, 0.5], [2, 0.5]],
-        velocity=np.zeros((3, 2)),
-        radius=[0.5] * 3,
+        [[0, 0.5], [1, 0.5], [2, 0.5]],
+        radius=0.5,
         mass=[1, 2, 3],
         gravity=[0, -9.8],
         walls=FLOOR,
@@ -98,15 +95,8 @@ def test_a_row_pushed_along_a_floor_moves_as_one_and_stops_pushing():
 
 @pytest.mark.parametrize("n", [3, 5, 12, 25])
 def test_touching_equal_disks_in_a_row_reverse_their_velocities(n: int):
-    """n (n - 1) / 2 collisions, in every order."""
     v = 0.1 * np.arange(n, 0, -1)
-    row = lay_out(
-        position=[[0.5 * i, 0] for i in range(n)],
-        velocity=[[speed, 0] for speed in v],
-        radius=[0.25] * n,
-        mass=[1.0] * n,
-        restitution=1.0,
-    )
+    row = lay_out([[0.5 * i, 0] for i in range(n)], [[speed, 0] for speed in v])
     one = asked(row, 1.0)
     record = computed(one)
 
@@ -121,29 +111,21 @@ def test_touching_equal_disks_in_a_row_reverse_their_velocities(n: int):
 
 
 def test_a_block_of_touching_disks_has_more_orders_than_can_be_tried():
-    """Not that its collisions do not end."""
     places = [[0.5 * x, 0.5 * y] for x in range(4) for y in range(4)]
-    block = lay_out(
-        position=[[-2, 0.125], *places],
-        velocity=[[4, 0], *[[0, 0]] * 16],
-        radius=[0.25] * 17,
-        mass=[1.0] * 17,
-        restitution=0.9,
-        friction=0.3,
-    )
+    block = lay_out([[-2, 0.125], *places], [[4, 0], *[[0, 0]] * 16], restitution=0.9, friction=0.3)
     reason = computed(asked(block, 1.0)).reason
     assert "more orders than can be tried, and the outcome may depend on the order" in reason
 
 
 @pytest.mark.parametrize(("restitution", "closes"), [(0.1, True), (0.17, True), (0.18, False)])
 def test_two_disks_on_a_floor_close_below_the_known_restitution(restitution: float, closes: bool):
-    """A disk on another one on a floor: 4 e / (1 + e)^2 = 1/2, e = 3 - 2 sqrt 2 = 0.1716."""
+    # 4 e / (1 + e)^2 = 1/2, e = 3 - 2 sqrt 2 = 0.1716
     matrix = np.array([[1.0, -1.0], [-1.0, 2.0]])
     assert collapse(matrix, np.array([1.0, 1.0]), restitution) == closes
 
 
 def test_impulses_of_a_bent_chain_are_the_limit_of_many_small_ones():
-    """In random order, each ends the approach of one contact: 1e-12 after 40 000."""
+    # In random order, each ends the approach of one contact: 1e-12 after 40 000.
     draw, k = np.random.default_rng(3), mpfr(128)
     for _ in range(10):
         n = 4
@@ -168,18 +150,16 @@ def test_impulses_of_a_bent_chain_are_the_limit_of_many_small_ones():
 
 
 def test_a_disk_does_not_stay_in_the_air_when_the_one_below_is_pushed_away():
-    """It would roll over it from 0.5 s on; it stood still there until a collision."""
+    # it stood still there until a collision
     pile = column([1, 1], [0.0, 0.0], 0.5)
     record = computed(asked(pile, 2.0, thrusts=[Thrust(0, 0.5, 1.0, [3.0, 0.0])]))
     assert record.reason == "disk 1 rolls over disk 0 at t = 0.5 s"
 
 
 def test_a_disk_that_lies_on_a_static_one_between_others_stays():
-    """It touches a static disk at its side, too, without a force."""
     scene = lay_out(
-        position=[[0, 0.5], [0, 1.5], [1, 1.5]],
-        velocity=np.zeros((3, 2)),
-        radius=[0.5] * 3,
+        [[0, 0.5], [0, 1.5], [1, 1.5]],
+        radius=0.5,
         mass=[np.inf, 1, np.inf],
         gravity=[0, -8],
         restitution=0.02,
@@ -191,8 +171,8 @@ def test_a_disk_that_lies_on_a_static_one_between_others_stays():
 
 
 def test_disks_of_a_random_pile_never_pass_through_each_other():
-    """Six disks at e = 0.5 with friction. One stayed in the air when the one below was pushed away,
-    so that two came to the same place, which the order of collisions divided by."""
+    # One stayed in the air when the one below was pushed away, so that two came to the same place,
+    # which the order of collisions divided by.
     one = random_scenario(7, 1)
     one = replace(one, scene=replace(one.scene, friction=0.3))
     record = computed(one)
@@ -208,8 +188,7 @@ def test_disks_of_a_random_pile_never_pass_through_each_other():
 def test_where_the_time_ran_out_over_more_bits_the_reason_is_the_time(
     monkeypatch: pytest.MonkeyPatch,
 ):
-    """Not that the collisions accumulate: so they do to 256 bits, but with 1024 the answer goes on.
-    The time runs out here as soon as more bits are tried."""
+    # Not that the collisions accumulate: so they do to 256 bits, but with 1024 the answer goes on.
     step, clock = WorkLimit.step, TimeLimit(1000.0, "no time")
 
     def stop_at_more_bits(limit: WorkLimit, t: float, bits: int) -> None:

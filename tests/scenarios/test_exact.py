@@ -21,10 +21,7 @@ from tests.scenarios.exercise_box import boxed, lasting
 
 
 def under_thrust(force: float, away: float = 0.0, duration: float = 2.0) -> Scenario:
-    """A disk of 1 kg under a thrust, `away` m from the origin."""
-    scene = lay_out(
-        position=[[away, 0.0]], velocity=[[2.0, 0.0]], radius=[0.25], mass=[1.0], restitution=0.9
-    )
+    scene = lay_out([[away, 0.0]], [2.0, 0.0], restitution=0.9)
     return with_oracle(
         Scenario(
             "thrust", "?", "", scene, duration, 0.02, thrusts=[Thrust(0, 0.0, 1.0, [force, 0.0])]
@@ -33,8 +30,7 @@ def under_thrust(force: float, away: float = 0.0, duration: float = 2.0) -> Scen
 
 
 def keeps_its_promise(one: Scenario, record: TruthRecord) -> bool:
-    """Whether the error bound is what engines are held to at most; a last place for the sum that it
-    is."""
+    """The error bound is what engines are held to at most; a last place for the sum that it is."""
     return record.error_bound <= DIVERGED * one.scene.radius.min() * (1 + 1e-12)
 
 
@@ -42,7 +38,6 @@ def keeps_its_promise(one: Scenario, record: TruthRecord) -> bool:
     ("force", "away"), [(1e6, 0.0), (9e5, 1e3), (1.0, 1e5), (0.0, 1e5), (1e3, 2e5)]
 )
 def test_an_answer_ends_where_float64_cannot_tell_it_any_more(force: float, away: float):
-    """After a long way, or far from the origin; before that it is what was promised."""
     one = under_thrust(force, away, 20.0)
     record = record_of(one)
     assert keeps_its_promise(one, record)
@@ -54,13 +49,12 @@ def test_an_answer_ends_where_float64_cannot_tell_it_any_more(force: float, away
 
 
 def test_where_nothing_can_be_proved_there_is_no_answer():
-    """At 10^6 m a rounding is 10^-10 m, and a few of them too much."""
+    # At 10^6 m a rounding is 10^-10 m, and a few of them too much.
     with pytest.raises(NoTruth, match="the rounding of float64 is more than"):
         record_of(under_thrust(0.0, away=1e6))
 
 
 def test_without_the_rule_the_promise_is_broken(monkeypatch: pytest.MonkeyPatch):
-    """The control: the same record, taken to its end."""
     monkeypatch.setattr(oracle_record, "within_float64", lambda _scenario, path, _error: path)
     one = under_thrust(1e6, 0.0, 20.0)
     assert not keeps_its_promise(one, computed(one))
@@ -68,22 +62,15 @@ def test_without_the_rule_the_promise_is_broken(monkeypatch: pytest.MonkeyPatch)
 
 @pytest.mark.parametrize("force", [1e10, 1e99, 1e100, 1e125, 1e150, 1e154, 1e160, 1e300])
 def test_a_thrust_out_of_scale_is_refused_at_once(force: float):
-    """It went on for ever from 1e154 N on, and gave an answer to 10^85 m below."""
+    # it went on for ever from 1e154 N on
     with pytest.raises(NoTruth, match="the largest acceleration by a thrust is"):
         record_of(under_thrust(force))
 
 
 @pytest.mark.parametrize("length", [1e-300, 1e-165, 1e-10, 1e-9])
 def test_a_wall_whose_square_is_nothing_is_refused_and_a_short_one_is_met(length: float):
-    """It was a division by 0, said on the terminal. A disk at 1 m/s is reflected at 0.5 s."""
-    scene = lay_out(
-        position=[[0, 0]],
-        velocity=[[1, 0]],
-        radius=[0.5],
-        mass=[1],
-        walls=[[[1, 0], [1, length]]],
-        restitution=1.0,
-    )
+    # it was a division by 0
+    scene = lay_out([[0, 0]], [1, 0], radius=0.5, walls=[[[1, 0], [1, length]]])
     one = Scenario("short", "?", "", scene, 1.0, 0.1)
     if length < 1e-9:
         with pytest.raises(NoTruth, match="too short to follow exactly"):
@@ -103,13 +90,11 @@ def test_a_wall_whose_square_is_nothing_is_refused_and_a_short_one_is_met(length
 def test_no_record_breaks_its_promise(
     force: float, away: float, radius: float, duration: float, gravity: tuple
 ):
-    """Whatever the sizes, ways and times: it ends, or there is none."""
     scene = lay_out(
-        position=[[away, 0.0], [away, 40.0]],
-        velocity=[[1.0, 0.0], [0.0, -1.0]],
+        [[away, 0.0], [away, 40.0]],
+        [[1.0, 0.0], [0.0, -1.0]],
         radius=[radius] * 2,
         mass=[1.0, 2.0],
-        restitution=1.0,
         gravity=gravity,
     )
     thrust = Thrust(0, 0.0, duration / 2, [force, 0.0])
@@ -134,8 +119,6 @@ UNITS = {
 @pytest.mark.parametrize("units", UNITS)
 @pytest.mark.parametrize("seed", [1, 2])
 def test_the_horizon_and_the_end_of_an_answer_are_the_same_in_other_units(units: str, seed: int):
-    """As are the collisions, to what the rounding of the new numbers of the scene becomes by
-    then."""
     change, one = UNITS[units], with_oracle(lasting(boxed(seed), 12.0))
     new = with_oracle(replace(change.scenario(replace(one, truth=None)), truth=None))
     before, after = computed(one), computed(new)
@@ -157,7 +140,6 @@ def test_the_horizon_and_the_end_of_an_answer_are_the_same_in_other_units(units:
 
 
 def test_a_horizon_by_metres_is_caught(monkeypatch: pytest.MonkeyPatch):
-    """The control: diverged by a nanometre, whatever the radius."""
     change, one = UNITS["lengths x 1000"], with_oracle(lasting(boxed(1), 12.0))
     monkeypatch.setattr(
         "crosscheck2d.scenarios.truth.horizon.DIVERGED", 1e-9 / one.scene.radius.max()
@@ -171,16 +153,7 @@ def test_a_horizon_by_metres_is_caught(monkeypatch: pytest.MonkeyPatch):
 
 
 def test_the_answer_up_to_the_bound_of_work_is_kept_and_says_so(monkeypatch: pytest.MonkeyPatch):
-    """One disk in a box for a million seconds: the first collisions are exact, and the rest is not
-    asked for."""
-    scene = lay_out(
-        position=[[0, 0]],
-        velocity=[[-2.19, 2.08]],
-        radius=[0.3],
-        mass=[1.0],
-        restitution=1.0,
-        walls=box([-0.5] * 2, [0.5] * 2),
-    )
+    scene = lay_out([[0, 0]], [-2.19, 2.08], radius=0.3, walls=box([-0.5] * 2, [0.5] * 2))
     one = with_oracle(Scenario("long", "?", "", scene, 1e6, 1.0, (1,)))
     monkeypatch.setattr(oracle, "WORK", 400)
     record = computed(one)

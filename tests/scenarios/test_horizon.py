@@ -29,17 +29,14 @@ than the first."""
 
 
 def path_of(one: Scenario) -> Path:
-    """The motion in many digits."""
     return trace(one.scene, [p for p in one.thrusts if p.force.any()], one.duration, digits(300))
 
 
 def asked(scene: Scene, duration: float, thrusts: tuple[Thrust, ...] = ()) -> Scenario:
-    """The scene for so many s."""
     return Scenario("asked", "?", "", scene, duration, duration / 50, thrusts=thrusts)
 
 
 def moved(scene: Scene, by: tuple[Array, Array, Array], k: int, scale: float) -> Scene:
-    """The scene with what number k of the roundings moves, times `scale`."""
     return replace(
         scene,
         position=scene.position + scale * by[0][:, k],
@@ -61,7 +58,6 @@ def carried(one: Scenario) -> Array:
 
 
 def ends(one: Scenario) -> Array:
-    """(n, 2) m, the positions at the end."""
     free = replace(record_of(one, path_of(one), 0.0, 300, ""), float64_horizon=np.inf)
     assert not free.reason
     return free.sampled(one.scene, one.thrusts, np.array([0.0, one.duration])).position[-1]
@@ -92,12 +88,11 @@ CHANGES: dict[str, Scenario] = {
     "two falling disks": asked(lay_out(**TWO, restitution=0.75, gravity=DOWN), 1.5),
     "a static disk under gravity": asked(
         lay_out(
-            position=[[0.125, 1.5], [0, 0]],
-            velocity=[[0.0, 0.5], [0, 0]],
+            [[0.125, 1.5], [0, 0]],
+            [[0.0, 0.5], [0, 0]],
             radius=[0.25, 0.5],
             mass=[1, np.inf],
             gravity=DOWN,
-            restitution=1.0,
         ),
         1.0,
     ),
@@ -130,10 +125,9 @@ CHANGES: dict[str, Scenario] = {
     ),
     "a collision on a disk that lies": asked(
         lay_out(
-            position=[[-0.125, 1.5], [0, 0.5]],
-            velocity=[[0, -1], [0, 0]],
+            [[-0.125, 1.5], [0, 0.5]],
+            [[0, -1], [0, 0]],
             radius=[0.25, 0.5],
-            mass=[1, 1],
             gravity=DOWN,
             walls=FLOOR,
             restitution=0.9375,
@@ -172,7 +166,6 @@ LYING = {"a collision on a disk that lies": 1, "a slide that becomes a roll": 0}
     [pytest.param(name, marks=[pytest.mark.slow] * name.startswith("many")) for name in CHANGES],
 )
 def test_what_a_rounding_becomes_is_the_derivative_of_the_motion(name: str):
-    """Against motions from starts that are moved by 1e-7, both ways, in many digits."""
     one = CHANGES[name]
     by, found = roundings(one.scene), carried(one)
     for k in range(by[0].shape[1]):
@@ -190,8 +183,6 @@ def test_what_a_rounding_becomes_is_the_derivative_of_the_motion(name: str):
 
 
 def test_the_derivatives_of_these_motions_pass_every_kind_of_change():
-    """Else the test above says less than it seems to: collisions, rest, release, wrap, thrust all
-    happen in them."""
     paths = {name: path_of(one) for name, one in CHANGES.items()}
     assert {name for name, path in paths.items() if not path.events} == {"a flight"}
     assert any(leg.y == -3 for leg in paths["a wrap"].legs[0])
@@ -215,10 +206,8 @@ def test_the_derivatives_of_these_motions_pass_every_kind_of_change():
     ],
 )
 def test_at_the_horizon_moved_starts_are_as_far_off_as_it_says(name: str):
-    """Twelve starts in many digits, each number a unit in the last place up or down: the disk that
-    is off the most is off by `DIVERGED` radii, root mean square. Twelve samples show that to 20 %,
-    and the largest of many is taken.
-    """
+    # Each number a unit in the last place up or down. Twelve samples show the root mean square to
+    # 20 %, and the largest of many is taken.
     one = scenario(name)
     until = float(computed(one).float64_horizon)
     one = replace(one, duration=until, sample_interval=until)
@@ -235,17 +224,15 @@ def test_at_the_horizon_moved_starts_are_as_far_off_as_it_says(name: str):
 
 
 ROW = lay_out(
-    position=[[-3, 0.125], [-1.5, 0.0], [-0.5, 0.0], [0.5, 0.0], [2.5, 0.25], [2.5, -1.0]],
-    velocity=[[3, 0.125], [0, 0], [0, 0], [0, 0], [-1, -0.5], [0.25, 1]],
+    [[-3, 0.125], [-1.5, 0.0], [-0.5, 0.0], [0.5, 0.0], [2.5, 0.25], [2.5, -1.0]],
+    [[3, 0.125], [0, 0], [0, 0], [0, 0], [-1, -0.5], [0.25, 1]],
     radius=[0.5, 0.5, 0.5, 0.5, 0.375, 0.25],
-    mass=np.ones(6),
-    restitution=1.0,
     walls=box([-4, -2], [4, 2]),
 )
 
 
 def test_what_touches_at_the_start_has_the_horizon_of_small_gaps():
-    """A row of three: it used to have none, since a start moved by a rounding overlaps."""
+    # it had none, since a start moved by a rounding overlaps
     touching = computed(asked(ROW, 12.0)).float64_horizon
     apart = replace(
         ROW,
@@ -258,7 +245,6 @@ def test_what_touches_at_the_start_has_the_horizon_of_small_gaps():
 
 
 def test_motions_that_are_not_chaotic_are_followed_to_their_end():
-    """Rows, single balls, what comes to rest."""
     for name in (
         "bouncing_ball_e09",
         "rest_on_floor",
@@ -272,8 +258,7 @@ def test_motions_that_are_not_chaotic_are_followed_to_their_end():
 
 
 def test_the_horizon_does_not_depend_on_the_units_of_length_and_time():
-    """Lengths times 1024, times divided by 8: powers of two, so that nothing is rounded
-    otherwise."""
+    # powers of two, so that nothing is rounded otherwise
     one = lasting(boxed(1), 12.0)
     until = computed(one).float64_horizon
     scene = one.scene
@@ -294,14 +279,12 @@ def test_the_horizon_does_not_depend_on_the_units_of_length_and_time():
 
 
 def test_the_horizon_is_shorter_beside_a_disk_far_away_that_nothing_meets():
-    """As the rounding is that of the largest coordinate in the scene (horizon.py); the control
-    moves no farther."""
+    # as the rounding is that of the largest coordinate in the scene (horizon.py)
     position = np.array([[x, y] for x in (-1.0, 0.0, 1.0) for y in (-0.7, 0.8)])
     velocity = np.random.default_rng(4).normal(0, 3, (6, 2))
     walls = [[[-2, -2], [2, -2]], [[2, -2], [2, 2]], [[2, 2], [-2, 2]], [[-2, 2], [-2, -2]]]
 
     def followed(far: float, y: float = 0.0) -> float:
-        """s, with a disk at rest at x = `far` m, outside of the box."""
         scene = Scene(
             position=[*position, [far, y]],
             velocity=[*velocity, [0.0, 0.0]],
@@ -318,8 +301,6 @@ def test_the_horizon_is_shorter_beside_a_disk_far_away_that_nothing_meets():
 
 
 def test_the_exact_answer_shares_no_code_with_the_event_engine():
-    """Nothing of the oracle or of its horizon imports what the scored engine `event_driven` is made
-    of."""
     folder = File(of_horizon.__file__).parent
     ours = list(folder.rglob("*.py"))
     imported = {

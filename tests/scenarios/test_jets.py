@@ -54,7 +54,6 @@ def quadrature(scene: Scene, thrusts: list[Thrust], until: float) -> np.ndarray:
 
 @pytest.mark.parametrize("kind", [None, mpfr, decimals])
 def test_a_free_disk_is_followed_under_thrusts_and_torques(kind):
-    """Thrusts in both frames that overlap, with a torque and without."""
     thrusts = [
         Thrust(0, 0.0, 1.0, [3.0, -1.0], frame="body"),
         Thrust(0, 0.5, 1.5, [1.0, 2.0], torque=0.5),
@@ -74,7 +73,6 @@ def test_a_free_disk_is_followed_under_thrusts_and_torques(kind):
 
 
 def test_the_oracle_agrees_with_the_closed_form_of_the_catalogue():
-    """To the bound that it claims."""
     one = scenario("body_frame_thrust")
     record = computed(one)
     expected = one.truth(one.times)
@@ -84,11 +82,9 @@ def test_the_oracle_agrees_with_the_closed_form_of_the_catalogue():
 
 
 def test_what_comes_after_the_thrust_is_answered():
-    """It falls onto a floor and rests there, in the sight of another disk that flies by."""
     scene = lay_out(
-        position=[[0, 3], [4, 3]],
-        velocity=[[0, 0], [-1, 0]],
-        radius=[0.25, 0.25],
+        [[0, 3], [4, 3]],
+        [[0, 0], [-1, 0]],
         mass=[2, 1],
         angular_velocity=[2, 0],
         gravity=[0, -9.8],
@@ -103,7 +99,6 @@ def test_what_comes_after_the_thrust_is_answered():
 
 @pytest.mark.parametrize("friction", [0.0, 0.5])
 def test_a_touch_while_it_acts_is_refused_in_one_sentence(friction: float):
-    """The floor is 0.5 m below; the answer lasts until then."""
     scene = replace(
         ALONE, position=[[0, 0.75]], velocity=[[0, 0]], walls=[[[-9, 0], [9, 0]]], friction=friction
     )

@@ -25,19 +25,17 @@ COUNTS = {"asteroids": 20, "falling_box": 980, "gas_of_100": 1974}
 
 
 def asked(scene: Scene, duration: float = 2.0, **fields) -> Scenario:
-    """A scenario of this scene, sampled 50 times."""
     return Scenario("scene", "?", "here", scene, duration, duration / 50, **fields)
 
 
 def states(scene: Scenario, record: TruthRecord):
-    """The trajectory of a record at the scenario's samples, beyond the horizon of float64, too."""
+    """At the scenario's samples, beyond the horizon of float64, too."""
     return replace(record, float64_horizon=np.inf).sampled(scene.scene, scene.thrusts, scene.times)
 
 
 def sampled(
     seed: int, n: int = 5, restitution: float = 1.0, gravity: float = 0.0, **fields
 ) -> Scene:
-    """Disks of several sizes and masses in a box of 2 m."""
     rng = np.random.default_rng(seed)
     radius = rng.uniform(0.05, 0.2, n)
     return lay_out(
@@ -54,13 +52,11 @@ def sampled(
 
 @pytest.fixture(scope="module")
 def records() -> dict[str, TruthRecord]:
-    """The records of the random scenes, computed here and now."""
     return {name: computed(scenario(name)) for name in RANDOM}
 
 
 @pytest.mark.parametrize("name", [*FLYING, "ship_thrust", "spin_under_torque"])
 def test_it_finds_what_the_closed_form_says(name: str):
-    """Same positions, same collisions with the same impulses, to 1e-12."""
     one = scenario(name)
     record = computed(one)
     expected, found = one.truth(one.times), states(one, record)
@@ -98,7 +94,6 @@ def test_it_finds_what_the_closed_form_says(name: str):
 
 @pytest.mark.parametrize("name", [pytest.param("asteroids", marks=pytest.mark.slow), *RANDOM[1:]])
 def test_the_random_scenes_are_answered_to_their_end(name: str, records: dict[str, TruthRecord]):
-    """No reason to stop, no overlap at any sample, as many collisions as ever."""
     one, record = scenario(name), records[name]
     truth = states(one, record)
 
@@ -118,8 +113,6 @@ def test_the_random_scenes_are_answered_to_their_end(name: str, records: dict[st
 def test_it_finds_the_collisions_of_a_float64_simulation(
     seed: int, restitution: float, gravity: float
 ):
-    """All pairs, no records, no filter: the same first ten collisions, before float64 loses its
-    digits."""
     # what comes to rest stops the clock of the simulation
     gravity = gravity if restitution > 0.5 else 0.0
     one = asked(sampled(seed, 4, restitution, gravity), 1.0)
@@ -131,8 +124,6 @@ def test_it_finds_the_collisions_of_a_float64_simulation(
 
 
 def test_all_numbers_give_the_same(records: dict[str, TruthRecord]):
-    """Decimals and mpfr, at one and at two precisions, agree in every leg; gravity and a static
-    disk included."""
     walled = sampled(3, 5, 0.9, -2.0)
     mass = np.append(walled.mass[:-1], np.inf)
     velocity = np.vstack([walled.velocity[:-1], [[0, 0]]])
@@ -148,7 +139,6 @@ def test_all_numbers_give_the_same(records: dict[str, TruthRecord]):
 
 @pytest.mark.skipif(not has_balls(), reason="python-flint is an extra")
 def test_interval_arithmetic_proves_every_comparison(records: dict[str, TruthRecord]):
-    """The random scenes are certified; balls that are too wide say so instead of guessing."""
     assert {name: record.method for name, record in records.items()} == dict.fromkeys(
         RANDOM, "certified"
     )
@@ -158,12 +148,10 @@ def test_interval_arithmetic_proves_every_comparison(records: dict[str, TruthRec
 
 
 def last_of(path: Path) -> np.ndarray:
-    """(n, 7) the last leg of each disk."""
     return np.array([[float(x) for x in legs[-1][:7]] for legs in path.legs])
 
 
 def test_the_order_of_the_disks_does_not_matter():
-    """Permuted, the same motion."""
     scene, order = sampled(5, 6, 0.9, -1.0), np.random.default_rng(1).permutation(6)
     names = ("position", "velocity", "radius", "mass", "inertia", "angle", "angular_velocity")
     permuted = replace(scene, **{name: getattr(scene, name)[order] for name in names})
@@ -173,7 +161,6 @@ def test_the_order_of_the_disks_does_not_matter():
 
 
 def test_a_mirrored_scene_moves_as_the_mirror_image():
-    """Left and right swapped, bit for bit."""
     scene, flip = sampled(6, 6, 0.9, -1.0), np.array([-1.0, 1.0])
     mirrored = replace(
         scene,
@@ -187,7 +174,6 @@ def test_a_mirrored_scene_moves_as_the_mirror_image():
 
 
 def test_time_runs_backwards_at_restitution_one():
-    """From the end state in float64, with reversed velocities, back to the start."""
     one = asked(sampled(7, 6), 3.0)
     truth = states(one, computed(one))
     assert len(truth.collisions) > 20
@@ -200,16 +186,13 @@ def test_time_runs_backwards_at_restitution_one():
 
 
 def test_a_ball_falls_on_a_static_disk_a_wall_end_and_a_resting_pair_of_them():
-    """The static side does not fall: contact times of fourth order, checked by the gap they
-    leave."""
     bumper = lay_out(
-        position=[[0.3, 2.0], [0, 0.5]],
-        velocity=[[-0.2, 0], [0, 0]],
+        [[0.3, 2.0], [0, 0.5]],
+        [[-0.2, 0], [0, 0]],
         radius=[0.25, 0.5],
         mass=[1, np.inf],
         walls=[[[1, -3], [2, -3]]],
         gravity=[0, -9.81],
-        restitution=1.0,
     )
     one = asked(bumper, 1.5)
     assert computed(one).method == ("certified" if has_balls() else "two-precision")
@@ -228,15 +211,7 @@ def test_a_ball_falls_on_a_static_disk_a_wall_end_and_a_resting_pair_of_them():
 
 
 def test_thrusts_carry_a_disk_into_a_wall():
-    """From rest, s = F t2 / 2m; the thrust ends, the disk flies on."""
-    scene = lay_out(
-        position=[[0, 0]],
-        velocity=[[0, 0]],
-        radius=[0.5],
-        mass=[2],
-        walls=[[[2, -1], [2, 1]]],
-        restitution=1,
-    )
+    scene = lay_out([[0, 0]], radius=0.5, mass=2, walls=[[[2, -1], [2, 1]]])
     one = asked(scene, 4.0, thrusts=[Thrust(0, 0.0, 1.0, [3.0, 0.0], 0.5)])
     record = computed(one)
 
@@ -246,15 +221,7 @@ def test_thrusts_carry_a_disk_into_a_wall():
 
 
 def test_an_edge_of_the_wrap_sets_the_centre_onto_the_other():
-    """Period 4 s over a box of 4 m at 1 m/s, velocity kept."""
-    scene = lay_out(
-        position=[[1, 0]],
-        velocity=[[1, 0]],
-        radius=[0.1],
-        mass=[1],
-        restitution=1,
-        wrap=[[-2, -2], [2, 2]],
-    )
+    scene = lay_out([[1, 0]], [1, 0], radius=0.1, wrap=[[-2, -2], [2, 2]])
     one = asked(scene, 10.0)
     truth = states(one, computed(one))
 
@@ -262,7 +229,6 @@ def test_an_edge_of_the_wrap_sets_the_centre_onto_the_other():
 
 
 def test_used_up_digits_end_the_truth(monkeypatch: pytest.MonkeyPatch):
-    """With too few bits for the scene the truth ends early, and says so."""
     monkeypatch.setattr("crosscheck2d.scenarios.truth.exact.FEWEST_BITS", 56)
     monkeypatch.setattr("crosscheck2d.scenarios.truth.exact.MOST_BITS", 100)
     one = scenario("falling_box")
@@ -280,8 +246,7 @@ def test_used_up_digits_end_the_truth(monkeypatch: pytest.MonkeyPatch):
 def test_a_stale_record_taken_for_fresh_is_caught(
     monkeypatch: pytest.MonkeyPatch, records: dict[str, TruthRecord]
 ):
-    """The bug of the first prototype: two precisions agree on a wrong motion, the gaps and the
-    collisions do not."""
+    # the bug of the first prototype: two precisions agree on a wrong motion
     monkeypatch.setattr(oracle_events.Motion, "stale", lambda _self, _record: False)
     one = scenario("asteroids")
     wrong = computed(one, mpfr)

@@ -20,17 +20,10 @@ from crosscheck2d.scenarios.truth.oracle.ties import CollisionLaw, Contact, Touc
 from crosscheck2d.scenarios.truth.record import TruthRecord
 from tests.scenarios.test_oracle import asked, states
 
-ROW = lay_out(
-    position=[[-2, 0], [0, 0], [0.5, 0], [1, 0]],
-    velocity=[[1, 0], [0, 0], [0, 0], [0, 0]],
-    radius=[0.25] * 4,
-    mass=[1] * 4,
-    restitution=1.0,
-)
+ROW = lay_out([[-2, 0], [0, 0], [0.5, 0], [1, 0]], [[1, 0], [0, 0], [0, 0], [0, 0]])
 
 
 def test_contacts_that_touch_are_resolved_one_after_the_other_where_only_one_approaches():
-    """The cradle whose disks touch exactly: the last flies off, the others rest."""
     one = asked(ROW, 3.0)
     truth = states(one, computed(one))
 
@@ -41,15 +34,7 @@ def test_contacts_that_touch_are_resolved_one_after_the_other_where_only_one_app
 
 
 def test_a_corner_at_a_right_angle_has_one_outcome():
-    """Both walls at once, e = 0.5, either order."""
-    scene = lay_out(
-        position=[[0, 0]],
-        velocity=[[1, 1]],
-        radius=[0.5],
-        mass=[1],
-        walls=box([-2, -2], [2, 2]),
-        restitution=0.5,
-    )
+    scene = lay_out([[0, 0]], [1, 1], radius=0.5, walls=box([-2, -2], [2, 2]), restitution=0.5)
     one = asked(scene, 2.5)
     truth = states(one, computed(one))
 
@@ -58,30 +43,11 @@ def test_a_corner_at_a_right_angle_has_one_outcome():
 
 
 BREAK = lay_out(
-    position=[[-2, 0], [np.sqrt(0.75), 0.5], [np.sqrt(0.75), -0.5]],
-    velocity=[[1, 0], [0, 0], [0, 0]],
-    radius=[0.5] * 3,
-    mass=[1] * 3,
-    restitution=1.0,
+    [[-2, 0], [np.sqrt(0.75), 0.5], [np.sqrt(0.75), -0.5]], [[1, 0], [0, 0], [0, 0]], radius=0.5
 )
-BALL = lay_out(
-    position=[[0, 1], [0, 2]],
-    velocity=[[0, 0], [0, 0]],
-    radius=[0.25, 0.25],
-    mass=[1, 1],
-    walls=[[[-9, 0], [9, 0]]],
-    gravity=[0, -9.81],
-    restitution=0.1,
-)
+BALL = lay_out([[0, 1], [0, 2]], walls=[[[-9, 0], [9, 0]]], gravity=[0, -9.81], restitution=0.1)
 ASIDE = replace(BALL, position=[[0, 1], [0.03, 2]])
-SEAM = lay_out(
-    position=[[1.5, 0], [-1.8, 0.1]],
-    velocity=[[1, 0], [0, 0]],
-    radius=[0.3, 0.3],
-    mass=[1, 1],
-    restitution=1,
-    wrap=[[-2, -2], [2, 2]],
-)
+SEAM = lay_out([[1.5, 0], [-1.8, 0.1]], [[1, 0], [0, 0]], radius=0.3, wrap=[[-2, -2], [2, 2]])
 
 
 @pytest.mark.parametrize(
@@ -103,7 +69,6 @@ SEAM = lay_out(
 def test_the_truth_ends_where_there_is_no_more_of_it(
     scene: Scene, until: float | None, reason: str
 ):
-    """The horizon is the instant itself, and the reason names it and the disks."""
     one = asked(scene, 4.0)
     record = computed(one)
 
@@ -115,7 +80,7 @@ def test_the_truth_ends_where_there_is_no_more_of_it(
     assert states(one, record).reason == record.reason
 
 
-CROWD = lay_out(position=np.arange(402).reshape(201, 2), velocity=np.zeros((201, 2)), radius=[0.1] * 201, mass=[1] * 201, restitution=1)  # fmt: skip # noqa: E501
+CROWD = lay_out(np.arange(402).reshape(201, 2), radius=0.1)
 
 
 @pytest.mark.parametrize(
@@ -142,13 +107,11 @@ CROWD = lay_out(position=np.arange(402).reshape(201, 2), velocity=np.zeros((201,
     ],
 )
 def test_what_it_cannot_do_is_refused(one: Scenario, reason: str):
-    """With one sentence; no overlap above a few units in the last place is corrected."""
     with pytest.raises(NoTruth, match=reason):
         computed(one)
 
 
 def ends(record: TruthRecord) -> list[dict[int, tuple[float, float]]]:
-    """The outcomes of a record: disk -> velocity."""
     return [
         {int(i): (vx, vy) for _, i, vx, vy in record.outcomes[record.outcomes[:, 0] == k].tolist()}
         for k in sorted({*record.outcomes[:, 0]})
@@ -162,16 +125,12 @@ def row(
     steps = 0.5 + np.array([*gaps, *[0.0] * (len(speeds) - 1 - len(gaps))])
     x = np.append(0.0, np.cumsum(steps))
     return lay_out(
-        position=np.stack([x, 0 * x], -1),
-        velocity=np.stack([speeds, 0 * x], -1),
-        radius=[0.25] * len(x),
-        mass=mass,
-        restitution=restitution,
+        np.stack([x, 0 * x], -1), np.stack([speeds, 0 * x], -1), mass=mass, restitution=restitution
     )
 
 
 def test_the_break_shot_has_two_outcomes_and_each_comes_with_its_collisions():
-    """The cue ends with (-1/8, -+0.2165); the second target, collision first, with (3/4, 0.433)."""
+    # the cue ends with (-1/8, -+0.2165); the second target, collision first, with (3/4, 0.433)
     one = asked(BREAK, 4.0)
     record = computed(one)
     found = sorted(ends(record), key=lambda end: end[0][1])
@@ -194,7 +153,6 @@ def test_the_break_shot_has_two_outcomes_and_each_comes_with_its_collisions():
 
 
 def test_a_squeeze_of_unequal_masses_has_two_outcomes():
-    """Masses 1, 3, 1 from both sides at once: (-0.5, -0.25, 1.25) or mirrored."""
     record = computed(asked(row([1, 0, -1], [1, 3, 1], gaps=(1.0, 1.0)), 2.0))
     found = sorted([end[i][0] for i in range(3)] for end in ends(record))
 
@@ -203,8 +161,6 @@ def test_a_squeeze_of_unequal_masses_has_two_outcomes():
 
 @pytest.mark.parametrize(("coming", "outcomes"), [(1, (8, 8)), (2, (22, 24))])
 def test_a_cradle_that_loses_energy_has_many_outcomes(coming: int, outcomes: tuple[int, int]):
-    """Five at e = 0.9: 8 with one disk coming in, 22 to 24 with two; they differ by 3e-5 and 4e-3
-    m/s."""
     gaps = tuple(float(k + 1 == coming) for k in range(coming))
     record = computed(asked(row([1.0] * coming + [0.0] * (5 - coming), [1] * 5, 0.9, gaps), 2.0))
     spread = np.ptp([[end[i][0] for i in end] for end in ends(record)], axis=0).max()
@@ -214,8 +170,7 @@ def test_a_cradle_that_loses_energy_has_many_outcomes(coming: int, outcomes: tup
 
 
 def test_taking_the_collisions_of_a_chain_as_they_come_is_caught(monkeypatch: pytest.MonkeyPatch):
-    """The planted bug: each collision by itself. It ends in one of the eight, as if there were no
-    others."""
+    # the planted bug: each collision by itself
     one = asked(row([1.0, 0, 0, 0, 0], [1] * 5, 0.9, (1.0,)), 2.0)
     assert len(ends(computed(one))) == 8
     monkeypatch.setattr(contact_finder.ContactFinder, "alone", lambda *_: True)
@@ -224,7 +179,6 @@ def test_taking_the_collisions_of_a_chain_as_they_come_is_caught(monkeypatch: py
 
 @pytest.mark.parametrize("coming", [1, 2])
 def test_a_cradle_that_keeps_its_energy_has_one(coming: int):
-    """Velocities sorted, and proven to be where balls are installed."""
     gaps = tuple(float(k + 1 == coming) for k in range(coming))
     one = asked(row([1.0] * coming + [0.0] * (5 - coming), [1] * 5, 1.0, gaps), 2.0)
     record = computed(one)
@@ -248,8 +202,6 @@ def test_a_cradle_that_keeps_its_energy_has_one(coming: int):
 def test_a_wedge_of_a_whole_part_of_180_degrees_has_one_outcome(
     degrees: int, restitution: float, outcomes: int
 ):
-    """A disk between two walls: at 180 / k degrees one for e = 1, at 90 degrees for every e, else
-    two."""
     k = mpfr(256)
     with k.precise():
         angle = gmpy2.const_pi() * degrees / 180
@@ -267,10 +219,8 @@ def test_a_wedge_of_a_whole_part_of_180_degrees_has_one_outcome(
 
 
 TILTED = lay_out(
-    position=[[0, 1]],
-    velocity=[[0, 0]],
-    radius=[0.5],
-    mass=[1],
+    [[0, 1]],
+    radius=0.5,
     gravity=[0, -9.81],
     restitution=0.5,
     walls=[[[-3, 2.25], [0, 0]], [[0, 0], [3, 2.25]]],
@@ -278,7 +228,6 @@ TILTED = lay_out(
 
 
 def test_what_can_still_be_said_is_said():
-    """Momentum along the floor, energy; on a wedge, where no direction is free, energy alone."""
     flat, wedge = (computed(asked(scene, 4.0)) for scene in (ASIDE, TILTED))
 
     assert any(
@@ -291,7 +240,6 @@ def test_what_can_still_be_said_is_said():
 
 
 def test_past_its_horizon_the_truth_is_cut():
-    """It gives what is known, be it nothing, and the reason; past the duration it is not asked."""
     for one, reason in (
         (with_oracle(asked(BREAK, 4.0)), "(2 outcomes)"),
         (scenario("disk_between_static_disks"), "the unstable orbit"),
@@ -307,7 +255,6 @@ def test_past_its_horizon_the_truth_is_cut():
 
 
 def test_what_is_said_of_one_disk_is_said_in_the_singular():
-    """A disk that falls into a wedge."""
     record = computed(asked(TILTED, 4.0))
     assert record.reason.startswith("disk 0 touches several walls at once and the outcome")
     assert record.remains[-1].startswith("disk 0: its kinetic energy, ")

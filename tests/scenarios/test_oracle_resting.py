@@ -30,8 +30,13 @@ KINDS = [None, mpfr]
 """Of numbers: balls where they are installed, digits."""
 
 
+def falling(position, velocity=(0, 0), restitution=0.5, walls=FLOOR, **fields) -> Scene:
+    return lay_out(
+        position, velocity, restitution=restitution, walls=walls, gravity=[0, -9.81], **fields
+    )
+
+
 def rests(record: TruthRecord) -> list[tuple[float, int, int]]:
-    """When (s) which disk comes to rest on what."""
     return [(t, int(i), int(j)) for t, i, j, kick, _ in record.events.tolist() if kick == 0]
 
 
@@ -40,8 +45,6 @@ def rests(record: TruthRecord) -> list[tuple[float, int, int]]:
     "name", ["bouncing_ball_e09", "rest_on_floor", "slide_on_incline", "column_of_ten"]
 )
 def test_what_has_a_closed_form_is_found_to_the_bound_claimed(name: str, kind):
-    """To its end, states and collisions, in digits and in balls; every contact at rest begins at
-    the start or is reported."""
     one = scenario(name)
     record = computed(one, kind)
     expected, found = one.truth(one.times), states(one, record)
@@ -68,15 +71,13 @@ def test_what_has_a_closed_form_is_found_to_the_bound_claimed(name: str, kind):
 def test_a_ball_on_a_slope_rests_when_its_bounces_end_and_slides_from_then_on(
     restitution, height, slope, speed
 ):
-    """At t_1 (1 + e) / (1 - e) with g cos(slope), along the slope with g sin(slope) all the
-    time."""
+    # at t_1 (1 + e) / (1 - e) with g cos(slope), along the slope with g sin(slope) all the time
     along, up = np.array([np.cos(slope), np.sin(slope)]), np.array([-np.sin(slope), np.cos(slope)])
-    scene = lay_out(
-        position=[(0.5 + height) * up],
-        velocity=[speed * along],
-        radius=[0.5],
-        mass=[2.0],
-        gravity=[0, -9.81],
+    scene = falling(
+        [(0.5 + height) * up],
+        [speed * along],
+        radius=0.5,
+        mass=2.0,
         walls=[[-5000 * along, 5000 * along]],
         restitution=restitution,
     )
@@ -104,17 +105,15 @@ def test_a_ball_on_a_slope_rests_when_its_bounces_end_and_slides_from_then_on(
 )
 @settings(max_examples=25, deadline=None)
 def test_a_ball_placed_on_a_slope_is_followed_to_the_end(degrees, friction, lift):
-    """Whether rounding places it above the slope or into it; g sin less friction, or 2/3 g sin."""
+    # g sin less friction, or 2/3 g sin
     a, up = (
         np.radians(degrees),
         np.array([np.sin(np.radians(degrees)), np.cos(np.radians(degrees))]),
     )
     along = np.array([np.cos(a), -np.sin(a)])
     scene = lay_out(
-        position=[-3 * along + (0.2 + lift) * up],
-        velocity=[[0, 0]],
-        radius=[0.2],
-        mass=[1.0],
+        [-3 * along + (0.2 + lift) * up],
+        radius=0.2,
         gravity=[0, -10],
         walls=[[-4 * along, 80 * along]],
         restitution=0.0,
@@ -139,13 +138,11 @@ def test_a_ball_placed_on_a_slope_is_followed_to_the_end(degrees, friction, lift
 
 @pytest.mark.parametrize("height", [0.3, 0.9])
 def test_what_overlaps_by_a_rounding_touches(height: float):
-    """0.9 - 0.6 and 0.3 differ by 5e-17, 0.3 - 0.1 and 0.2 by 3e-17."""
+    # 0.9 - 0.6 and 0.3 differ by 5e-17, 0.3 - 0.1 and 0.2 by 3e-17
     floor = 0.6 if height > 0.5 else 0.0
     scene = lay_out(
-        position=[[0, height], [0, height + 0.4]],
-        velocity=[[0, 0], [0, 0]],
+        [[0, height], [0, height + 0.4]],
         radius=[0.3, 0.1],
-        mass=[1.0, 1.0],
         gravity=[0, -10],
         walls=[[[-9, floor], [9, floor]]],
         restitution=0.5,
@@ -162,12 +159,10 @@ def test_what_overlaps_by_a_rounding_touches(height: float):
 def test_a_collision_on_a_resting_disk_is_the_limit_of_small_gaps(
     restitution: float, heavy: int, upper: float, lower: float
 ):
-    """The two alternate with the floor until they part; speeds in those of the collision (ground
-    truth, section 5)."""
+    # the two alternate with the floor until they part
     scene = lay_out(
-        position=[[0, 0.25], [0, 1.5]],
-        velocity=[[0, 0], [0, -1]],
-        radius=[0.25, 0.25],
+        [[0, 0.25], [0, 1.5]],
+        [[0, 0], [0, -1]],
         mass=[1, heavy],
         restitution=restitution,
         walls=FLOOR,
@@ -224,16 +219,12 @@ def hopping(scene: Scene, until: float, least: float) -> np.ndarray:
 
 
 def test_a_simulation_that_never_rests_comes_near_as_its_hops_shrink():
-    """A disk lands on a resting one beside its middle; hops of 0.05 m/s and less, steps of 0.2
-    ms."""
-    scene = lay_out(
-        position=[[0, 0.4], [-0.2, 2.6]],
-        velocity=[[0.5, 0], [0.4, 0]],
+    scene = falling(
+        [[0, 0.4], [-0.2, 2.6]],
+        [[0.5, 0], [0.4, 0]],
         radius=[0.3, 0.25],
         mass=[2, 1],
         restitution=0.6,
-        walls=FLOOR,
-        gravity=[0, -9.81],
     )
     one = asked(scene, 1.0)
     record = computed(one)
@@ -256,7 +247,6 @@ def test_a_simulation_that_never_rests_comes_near_as_its_hops_shrink():
 def test_energy_falls_nothing_overlaps_and_mirror_and_order_do_not_matter(
     seed: int, restitution: float
 ):
-    """Three disks fall in a box and settle; up to where the answer ends."""
     scene = sampled(seed, 3, restitution, -9.81)
     one = asked(scene, 2.0)
     record = computed(one)
@@ -289,17 +279,8 @@ def test_energy_falls_nothing_overlaps_and_mirror_and_order_do_not_matter(
 
 
 def test_a_tail_that_something_can_reach_is_not_cut_short(monkeypatch: pytest.MonkeyPatch):
-    """The planted bug: rule Z1 taken for granted. Another disk falls through the one that is
-    asleep."""
-    scene = lay_out(
-        position=[[0, 0.5], [0.1, 1.2]],
-        velocity=[[0, 0], [0, 0]],
-        radius=[0.25, 0.25],
-        mass=[1, 1],
-        restitution=0.9,
-        walls=FLOOR,
-        gravity=[0, -9.81],
-    )
+    # the planted bug: rule Z1 taken for granted
+    scene = falling([[0, 0.5], [0.1, 1.2]], restitution=0.9)
     one = asked(scene, 1.0)
     right = states(one, computed(one))
     monkeypatch.setattr(oracle_resting, "untouched", lambda *_: True)
@@ -310,15 +291,9 @@ def test_a_tail_that_something_can_reach_is_not_cut_short(monkeypatch: pytest.Mo
 
 
 def test_a_resting_disk_slides_off_its_wall_or_on_to_the_next():
-    """At 2 m/s over a seam of two walls in line, then off the edge: a parabola, as 4 > r g."""
-    scene = lay_out(
-        position=[[-1, 0.25]],
-        velocity=[[2, 0]],
-        radius=[0.25],
-        mass=[1],
-        gravity=[0, -9.81],
-        restitution=0.5,
-        walls=[[[-3, 0], [0, 0]], [[1, 0], [0, 0]], [[-9, -9], [9, -9]]],
+    # at 2 m/s off the edge: a parabola, as 4 > r g
+    scene = falling(
+        [[-1, 0.25]], [2, 0], walls=[[[-3, 0], [0, 0]], [[1, 0], [0, 0]], [[-9, -9], [9, -9]]]
     )
     one = asked(scene, 1.5)
     truth, t = states(one, computed(one)), one.times
@@ -344,18 +319,8 @@ def pieces(length: float, both: bool) -> list[list[list[float]]]:
 
 @pytest.mark.parametrize(("length", "both"), [(1.0, False), (1.375, False), (1.0, True)])
 def test_a_floor_of_pieces_is_a_floor(length: float, both: bool):
-    """Dropped onto the very seam, and drifting over seams, as on a floor of one piece; also where
-    the pieces overlap, or each of them is there twice."""
     for x, u in ((0.0, 0.0), (-1.25, 0.75)):
-        scene = lay_out(
-            position=[[x, 1.25]],
-            velocity=[[u, 0]],
-            radius=[0.25],
-            mass=[1],
-            gravity=[0, -9.81],
-            restitution=0.5,
-            walls=FLOOR,
-        )
+        scene = falling([[x, 1.25]], [u, 0])
         whole, apart = (
             asked(replace(scene, walls=walls), 2.0) for walls in (FLOOR, pieces(length, both))
         )
@@ -367,18 +332,8 @@ def test_a_floor_of_pieces_is_a_floor(length: float, both: bool):
 
 @pytest.mark.parametrize("turned", [False, True])
 def test_a_disk_that_passes_a_joint_in_its_bounces_rests_on_the_wall_beyond(turned: bool):
-    """At 4 m/s its bounces die out beyond the joint: it flies off the end of the floor as off that
-    of one piece, and each collision is with the wall below it."""
     second = [[4, 0], [0, 0]] if turned else [[0, 0], [4, 0]]
-    scene = lay_out(
-        position=[[-1, 0.3125]],
-        velocity=[[4, 0]],
-        radius=[0.25],
-        mass=[1],
-        gravity=[0, -9.81],
-        restitution=0.5,
-        walls=[[[-4, 0], [4, 0]]],
-    )
+    scene = falling([[-1, 0.3125]], [4, 0], walls=[[[-4, 0], [4, 0]]])
     whole, apart = (
         asked(replace(scene, walls=walls), 2.0)
         for walls in (scene.walls, [[[-4, 0], [0, 0]], second])
@@ -394,18 +349,11 @@ def test_a_disk_that_passes_a_joint_in_its_bounces_rests_on_the_wall_beyond(turn
 
 
 def test_a_truth_that_ends_at_a_joint_says_that_the_walls_are_not_in_line():
-    """A joint one unit in the last place off the line, as in a scene that was turned: a slow disk
-    turns about it; one wall instead of the two has an answer. Below the line it bounces off the
-    next wall to its rest."""
+    # A joint one unit in the last place off the line: a slow disk turns about it. Below the line it
+    # bounces off the next wall to its rest.
     joint = float(np.nextafter(0.7, np.inf))
-    scene = lay_out(
-        position=[[-1, 1]],
-        velocity=[[1, 0]],
-        radius=[0.25],
-        mass=[1],
-        gravity=[0, -9.81],
-        restitution=0.5,
-        walls=[[[-4, 0.7], [0.25, joint]], [[0.25, joint], [4, 0.7]]],
+    scene = falling(
+        [[-1, 1]], [1, 0], walls=[[[-4, 0.7], [0.25, joint]], [[0.25, joint], [4, 0.7]]]
     )
     reason = computed(asked(scene, 2.0)).reason
     one = replace(scene, walls=[[[-4, 0.7], [4, 0.7]]])
@@ -419,19 +367,9 @@ def test_a_truth_that_ends_at_a_joint_says_that_the_walls_are_not_in_line():
 
 
 def test_what_lies_in_a_wedge_or_on_a_static_disk_stays():
-    """Held by two walls, or balanced straight above a disk that cannot move."""
-    wedge = lay_out(
-        position=[[0, 0.625]],
-        velocity=[[0, 0]],
-        radius=[0.5],
-        mass=[1],
-        gravity=[0, -9.81],
-        restitution=0.5,
-        walls=[[[-4, 3], [0, 0]], [[0, 0], [4, 3]]],
-    )
+    wedge = falling([[0, 0.625]], radius=0.5, walls=[[[-4, 3], [0, 0]], [[0, 0], [4, 3]]])
     balanced = lay_out(
-        position=[[0, 0], [0, 0.75], [0, 1.5]],
-        velocity=np.zeros((3, 2)),
+        [[0, 0], [0, 0.75], [0, 1.5]],
         radius=[0.5, 0.25, 0.5],
         mass=[np.inf, 1, 1],
         gravity=[0, -9.81],
@@ -446,16 +384,7 @@ def test_what_lies_in_a_wedge_or_on_a_static_disk_stays():
 
 
 def test_a_thrust_lifts_a_resting_disk_and_lets_it_fall():
-    """Twice its weight for half a second from 1 s on."""
-    scene = lay_out(
-        position=[[0, 0.25]],
-        velocity=[[0, 0]],
-        radius=[0.25],
-        mass=[2],
-        gravity=[0, -9.81],
-        restitution=0.5,
-        walls=FLOOR,
-    )
+    scene = falling([[0, 0.25]], mass=2)
     one = asked(scene, 5.0, thrusts=[Thrust(0, 1.0, 1.5, [0.0, 4 * 9.81])])
     record = computed(one)
     truth, t = states(one, record), one.times
@@ -471,17 +400,9 @@ def test_a_thrust_lifts_a_resting_disk_and_lets_it_fall():
 
 
 def test_a_disk_in_the_corner_of_a_tilted_box_rests_on_both_walls():
-    """Along one wall it bounces off the other to rest, as the two stand at right angles; at 106
-    degrees the bounces on both come so close that rounding decides their order first."""
-    square = lay_out(
-        position=[[0, 2.25]],
-        velocity=[[0, 0]],
-        radius=[0.5],
-        mass=[1],
-        gravity=[0, -9.81],
-        restitution=0.5,
-        walls=[[[-4, 3], [0, 0]], [[0, 0], [3, 4]]],
-    )
+    # Along one wall it bounces off the other to rest, as the two stand at right angles; at 106
+    # degrees the bounces on both come so close that rounding decides their order first.
+    square = falling([[0, 2.25]], radius=0.5, walls=[[[-4, 3], [0, 0]], [[0, 0], [3, 4]]])
     record = computed(asked(square, 8.0))
     assert record.reason == ""
     assert {j for _, _, j in rests(record)} == {-1, -2}
@@ -500,8 +421,6 @@ def test_a_disk_in_the_corner_of_a_tilted_box_rests_on_both_walls():
 
 
 def test_a_settling_box_is_answered_far_beyond_its_first_rest():
-    """Twenty-one disks at e = 0.5 and g = 10: one after the other comes to rest, until two pile up
-    on each other."""
     record = computed(lasting(boxed(2, 0.5, 10.0), 2.0), mpfr)
     first = rests(record)[0][0]
 
@@ -512,7 +431,7 @@ def test_a_settling_box_is_answered_far_beyond_its_first_rest():
 
 
 def test_round_the_end_of_a_wall_no_momentum_is_said_to_stay():
-    """There the normal of the wall turns with the disk: only its energy is known on."""
+    # there the normal of the wall turns with the disk
     scene = Scene(
         position=np.array([[0.0, 0.5]]),
         velocity=np.array([[2.0, 0.0]]),
@@ -530,13 +449,9 @@ def test_round_the_end_of_a_wall_no_momentum_is_said_to_stay():
 
 
 def dropped(restitution: float, duration: float = 1.0, scale: float = 1.0) -> Scenario:
-    """A ball that falls 0.75 m onto a floor under 9.81 m/s2, in a scene whose lengths and times are
-    `scale` of that."""
     scene = lay_out(
-        position=[[0, scale]],
-        velocity=[[0, 0]],
-        radius=[scale / 4],
-        mass=[1],
+        [[0, scale]],
+        radius=scale / 4,
         restitution=restitution,
         gravity=[0, -9.81 / scale],
         walls=[[[-3 * scale, 0], [3 * scale, 0]]],
@@ -546,7 +461,6 @@ def dropped(restitution: float, duration: float = 1.0, scale: float = 1.0) -> Sc
 
 @pytest.mark.parametrize("restitution", [0.99, 1 - 1e-12])
 def test_no_bounce_after_the_end_of_the_scene_is_listed(restitution: float):
-    """However many more would follow."""
     record = computed(dropped(restitution))
     assert len(record.events) == 1
     assert record.horizon == np.inf
@@ -554,7 +468,7 @@ def test_no_bounce_after_the_end_of_the_scene_is_listed(restitution: float):
 
 @pytest.mark.parametrize("miss", [1e-2, 1e-3, 3e-4, 1e-9])
 def test_bounces_are_exact_where_the_restitution_is_close_to_one(miss: float):
-    """The place at the end, from bounce to bounce in rational arithmetic but for one root."""
+    # from bounce to bounce in rational arithmetic but for one root
     one = dropped(1 - miss, 4.0)
     (height, g), e = (0.75, 9.81), 1 - miss
     fall = np.sqrt(2 * height / g)
@@ -568,12 +482,11 @@ def test_bounces_are_exact_where_the_restitution_is_close_to_one(miss: float):
 
 @pytest.mark.parametrize("restitution", [0.999, 1.0])
 def test_the_collisions_of_a_fast_disk_in_a_narrow_box_do_not_accumulate(restitution: float):
-    """At 1e5 m/s, a collision each 1e-11 s: 64 of them within 1e-9 s."""
+    # a collision each 1e-11 s: 64 of them within 1e-9 s
     scene = lay_out(
-        position=[[0, 0]],
-        velocity=[[1e5, 3e4]],
-        radius=[1e-3],
-        mass=[1],
+        [[0, 0]],
+        [1e5, 3e4],
+        radius=0.001,
         restitution=restitution,
         walls=box([-1.001e-3, -1.001e-3], [1.001e-3, 1.001e-3]),
     )
@@ -583,8 +496,6 @@ def test_the_collisions_of_a_fast_disk_in_a_narrow_box_do_not_accumulate(restitu
 
 
 def test_the_bounces_listed_do_not_depend_on_the_unit_of_time():
-    """All that steps of the scene can resolve are listed, so that no right engine has spurious
-    ones."""
     slow, fast = (computed(dropped(0.5, 4.0, scale)).events for scale in (1.0, 2.0**-12))
     assert len(fast) >= len(slow) - 2
 
@@ -596,14 +507,13 @@ def test_the_bounces_listed_do_not_depend_on_the_unit_of_time():
 def test_float64_excludes_no_point_that_lies_on_the_line_of_a_wall(
     points: list[tuple[int, int]], scale: float
 ):
-    """Many points of a grid lie in line, or miss it by the rounding of a tenth."""
     at = scale * np.array(points, dtype=float)
 
     assert points_in_line(at[:2], at) == [k for k in range(len(at)) if collinear(at[:2], at[k])]
 
 
 def test_of_many_walls_few_points_are_compared_exactly(monkeypatch: pytest.MonkeyPatch):
-    """In rationals all of some thousand walls would take minutes."""
+    # in rationals all of some thousand walls would take minutes
     asked: list[object] = []
     real = contact_finder.collinear
     monkeypatch.setattr(

@@ -15,7 +15,6 @@ UNDECIDED = "rounding decides the order of the collisions of disk"
 
 
 def record_of_scene(scene: Scene, duration: float = 2.0) -> TruthRecord:
-    """The exact answer for so many s."""
     return computed(Scenario("asked", "?", "", scene, duration, duration / 40))
 
 
@@ -24,17 +23,10 @@ def three(turn: float, late: tuple[float, float, float] = (0, 0, 0), mass: float
     mass."""
     angle = turn + 2 * np.pi / 3 * np.arange(3)
     way = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-    return lay_out(
-        position=(1 + np.array(late)[:, None]) * way,
-        velocity=-way,
-        radius=[0.25] * 3,
-        mass=[mass, 1.0, 1.0],
-        restitution=1.0,
-    )
+    return lay_out((1 + np.array(late)[:, None]) * way, -way, mass=[mass, 1.0, 1.0])
 
 
 def turned(points: list[list[float]], turn: float) -> Array:
-    """(n, 2), these vectors turned by an angle, rad."""
     return np.array(points) @ [[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]]
 
 
@@ -45,22 +37,17 @@ def wall_and_disk(turn: float, late: float = 0.0) -> Scene:
     velocity = np.array([[0.0, -1.0], [-1.0, -0.75]])
     meet = np.array([[0.0, 0.25], [0.0, 0.25] + slant])
     return lay_out(
-        position=turned((meet - [[1.75], [1.75 + late]] * velocity).tolist(), turn),
-        velocity=turned(velocity.tolist(), turn),
-        radius=[0.25, 0.25],
+        turned((meet - [[1.75], [1.75 + late]] * velocity).tolist(), turn),
+        turned(velocity.tolist(), turn),
         mass=[1.0, 2.0],
-        restitution=1.0,
         walls=[turned([[-5.0, 0.0], [5.0, 0.0]], turn)],
     )
 
 
 def corner(turn: float, restitution: float) -> Scene:
-    """A disk that flies into the right angle of two walls, turned."""
     return lay_out(
-        position=turned([[2.0, 2.0]], turn),
-        velocity=turned([[-1.0, -1.0]], turn),
-        radius=[0.25],
-        mass=[1.0],
+        turned([[2.0, 2.0]], turn),
+        turned([[-1.0, -1.0]], turn),
         restitution=restitution,
         walls=[turned([[0, 0], [5, 0]], turn), turned([[0, 5], [0, 0]], turn)],
     )
@@ -69,7 +56,6 @@ def corner(turn: float, restitution: float) -> Scene:
 @pytest.mark.parametrize("turn", [0.0, 0.7318, 2.5])
 @pytest.mark.parametrize("mass", [1.0, 3.0])
 def test_three_disks_that_meet_at_a_point_have_no_answer_after_that(turn: float, mass: float):
-    """Equal disks and unequal ones: by symmetry they meet but for a rounding."""
     record = record_of_scene(three(turn, mass=mass))
 
     assert record.horizon == pytest.approx(MEET, rel=1e-12)
@@ -80,7 +66,6 @@ def test_three_disks_that_meet_at_a_point_have_no_answer_after_that(turn: float,
 
 @pytest.mark.parametrize("turn", [0.0, 0.7318])
 def test_a_wall_and_a_disk_met_at_once_have_no_answer_after_that(turn: float):
-    """Which of them comes first is a matter of rounding, also where both are turned."""
     record = record_of_scene(wall_and_disk(turn), 3.0)
 
     assert record.horizon == pytest.approx(1.75, rel=1e-12)
@@ -89,7 +74,6 @@ def test_a_wall_and_a_disk_met_at_once_have_no_answer_after_that(turn: float):
 
 @pytest.mark.parametrize("turn", [0.0, 0.7318])
 def test_collisions_a_microsecond_apart_keep_their_horizon(turn: float):
-    """The same scenes: 1e-6 s is far above the rounding."""
     for scene, least in ((three(turn, (0, 1e-6, 3e-6)), 3), (wall_and_disk(turn, 1e-6), 2)):
         record = record_of_scene(scene, 3.0)
         assert (record.horizon, record.float64_horizon, record.reason) == (np.inf, np.inf, "")
@@ -97,15 +81,11 @@ def test_collisions_a_microsecond_apart_keep_their_horizon(turn: float):
 
 
 def test_collisions_that_their_order_does_not_change_keep_their_horizon():
-    """A right angle; a cradle with gaps, in which every order gives the same."""
     for turn in (0.0, 0.7318):
         for restitution in (0.5, 1.0):
             assert record_of_scene(corner(turn, restitution)).horizon == np.inf
     row = lay_out(
-        position=[[-2.0, 0.0], [0.0, 0.0], [0.5 + 1e-16, 0.0], [1.0 + 3e-16, 0.0], [3.0, 0.0]],
-        velocity=[[1.0, 0.0], [0.0, 0.0], [0.0, 0.0], [0.0, 0.0], [-1.0, 0.0]],
-        radius=[0.25] * 5,
-        mass=[1.0] * 5,
-        restitution=1.0,
+        [[-2.0, 0.0], [0.0, 0.0], [0.5 + 1e-16, 0.0], [1.0 + 3e-16, 0.0], [3.0, 0.0]],
+        [[1.0, 0.0], [0.0, 0.0], [0.0, 0.0], [0.0, 0.0], [-1.0, 0.0]],
     )
     assert record_of_scene(row, 4.0).horizon == np.inf

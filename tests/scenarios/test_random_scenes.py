@@ -29,19 +29,15 @@ REFUSALS = (
 
 @pytest.fixture(scope="module", autouse=True)
 def _compiled() -> None:
-    """The kernels with walls and without: compiling them is not what is limited."""
     for one in (random_scenario(0, 0), scenario("near_miss")):
         played(one)
 
 
 def played(one: Scenario) -> Run:
-    """By the event engine, asked at the samples."""
     return play(EventDriven(), "event_driven:float64", one, one.sample_interval)
 
 
 def sweep(asked: list[Scenario]) -> None:
-    """Each ends within the limit, played to its end or refused in a sentence that says who and
-    when."""
     runs = each_within(LIMIT, played, asked)
 
     assert [one.name for one, run in zip(asked, runs) if run is None] == []
@@ -91,13 +87,11 @@ def agree(asked: list[Scenario]) -> None:
 
 
 def test_a_few_random_scenes_end_played_or_refused_by_name():
-    """Five of each layout."""
     sweep(random_scenarios(FAST))
 
 
 @pytest.mark.slow
 def test_a_few_random_scenes_are_as_the_exact_answer_has_them():
-    """Up to its horizon, in whatever corner they come to rest."""
     agree(random_scenarios(2 * len(LAYOUTS)))
 
 
@@ -126,8 +120,8 @@ def tiny_wall(number: int) -> Scenario:
 
 @pytest.mark.slow
 def test_walls_down_to_a_nanometre_are_as_the_exact_answer_has_them():
-    """The face, or the nearer end: a normal that is wrong by a nanometre gives 1e-8 m. But at e = 0
-    a disk leaves an end almost along the wall, and rounding has it meet the other end, too."""
+    # A normal that is wrong by a nanometre gives 1e-8 m. But at e = 0 a disk leaves an end almost
+    # along the wall, and rounding has it meet the other end, too.
     scenes = [tiny_wall(number) for number in range(150)]
     found = [departure(one) for one in scenes]
     far = [one.scene.restitution for one, (off, _) in zip(scenes, found) if off > 1e-9]
@@ -141,20 +135,16 @@ def test_walls_down_to_a_nanometre_are_as_the_exact_answer_has_them():
 @pytest.mark.long
 @pytest.mark.parametrize("chunk", range(CHUNKS))
 def test_all_random_scenes_end_played_or_refused_by_name(chunk):
-    """Five hundred."""
     sweep(random_scenarios(LONG)[chunk::CHUNKS])
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("chunk", range(CHUNKS))
 def test_all_random_scenes_are_as_the_exact_answer_has_them(chunk):
-    """The same five hundred."""
     agree(random_scenarios(LONG)[chunk::CHUNKS])
 
 
 def test_scenes_depend_on_their_seed_and_number_only():
-    """The first of many are the same as few, another seed has others, and every kind of scene is
-    there."""
     few, many = random_scenarios(5, seed=3), random_scenarios(200, seed=3)
     assert all((one.scene.position == other.scene.position).all() for one, other in zip(few, many))
     assert len({one.name for one in [*many, *random_scenarios(200, seed=4)]}) == 400
@@ -166,12 +156,10 @@ def test_scenes_depend_on_their_seed_and_number_only():
 
 
 def test_what_never_ends_is_ended_and_reported():
-    """The control of the limit: one of three pieces loops for ever."""
     assert each_within(0.2, endless_at_two, [1, 2, 3]) == [1, None, 3]
 
 
 def endless_at_two(item: int) -> int:
-    """The item, or nothing."""
     while item == 2:
         pass
     return item

@@ -11,13 +11,14 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from crosscheck2d.scenarios.files import tables
 from crosscheck2d.scenarios.files.scene_file import SceneFileError, read_scene_file, scene_text
+from crosscheck2d.scenarios.files.tables import MOST_WALLS
 from crosscheck2d.scenarios.model import Scenario, Scene, Thrust
 from tests.scenarios.scene_faults import DISK, FAULTS, SCENES, THRUST, TWO
 
 
 def faults_of(text: str | bytes, folder: Path) -> list[str]:
-    """What the reader has against `text`, without the path at the head of each line."""
     path = folder / "two.toml"
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
     with pytest.raises(SceneFileError) as refusal:
@@ -30,7 +31,6 @@ def faults_of(text: str | bytes, folder: Path) -> list[str]:
 
 @pytest.mark.parametrize(("good", "bad", "line"), FAULTS)
 def test_a_fault_is_one_plain_line(good: str, bad: str, line: str, tmp_path: Path) -> None:
-    """One wrong thing in a good file gives one line: key, value, what is wrong, what is allowed."""
     assert good in TWO
     (fault,) = faults_of(TWO.replace(good, bad, 1), tmp_path)
     assert fault.startswith(line)
@@ -47,19 +47,16 @@ def test_a_fault_is_one_plain_line(good: str, bad: str, line: str, tmp_path: Pat
     ],
 )
 def test_bytes_that_are_no_text_are_refused(content: bytes, line: str, tmp_path: Path) -> None:
-    """Wrong encodings and huge files are distinguished."""
     assert faults_of(content, tmp_path) == [line]
 
 
 def test_a_byte_order_mark_and_the_line_ends_of_windows_change_nothing(tmp_path: Path) -> None:
-    """What an editor puts around the text is no fault of the scene."""
     path = tmp_path / "two.toml"
     path.write_bytes(b"\xef\xbb\xbf" + TWO.replace("\n", "\r\n").encode())
     assert str(read_scene_file(path)) == str(read_scene_file(SCENES / "two.toml"))
 
 
 def test_a_file_that_cannot_be_opened_is_named(tmp_path: Path) -> None:
-    """A missing file, a folder and a path no system takes: one line each, no traceback."""
     for path, line in {
         tmp_path / "gone.toml": "no such file or directory; must be a readable TOML file",
         tmp_path: "is a directory; must be a readable TOML file",
@@ -71,7 +68,6 @@ def test_a_file_that_cannot_be_opened_is_named(tmp_path: Path) -> None:
 
 
 def test_every_fault_is_reported_at_once(tmp_path: Path) -> None:
-    """Faults in one key hide none in another, not even where a check looks at both."""
     text = (
         TWO.replace("radius = 0.25", "radius = -1").replace("= 0.02", "= 0.03").replace("0.9", "2")
     )
@@ -91,7 +87,6 @@ def test_every_fault_is_reported_at_once(tmp_path: Path) -> None:
 
 
 def test_no_disk_is_a_fault_whether_left_out_or_empty(tmp_path: Path) -> None:
-    """A scene holds at least one disk."""
     head = 'name = "none"\nduration = 1\nsample_interval = 1\nrestitution = 1\n'
     assert faults_of(head, tmp_path) == ["disk: missing; must be 1 to 100000 [[disk]] tables"]
     assert faults_of(head + "disk = []", tmp_path) == [
@@ -101,7 +96,6 @@ def test_no_disk_is_a_fault_whether_left_out_or_empty(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_more_disks_than_a_scene_may_have_are_one_fault(tmp_path: Path) -> None:
-    """One more than allowed, which takes two seconds to read."""
     head = 'name = "many"\nduration = 1\nsample_interval = 1\nrestitution = 1\n'
     one = "{position = [0, 0], radius = 1, static = 1},"
     (fault,) = faults_of(head + f"disk = [{one * 100_001}]", tmp_path)
@@ -109,14 +103,12 @@ def test_more_disks_than_a_scene_may_have_are_one_fault(tmp_path: Path) -> None:
 
 
 def test_a_pile_in_one_place_gives_a_bounded_message(tmp_path: Path) -> None:
-    """A thousand disks in one place are half a million overlaps; a hundred are listed."""
     faults = faults_of(TWO + DISK * 1000, tmp_path)
     assert len(faults) == 101
     assert faults[-1] == "more than 100 faults; must be none (the rest is not listed)"
 
 
 def test_so_many_faulty_tables_give_a_bounded_message(tmp_path: Path) -> None:
-    """As an editor's slip in a file of a thousand disks does."""
     faults = faults_of(TWO + DISK.replace("radius", "raduis") * 1000, tmp_path)
 
     assert len(faults) == 101
@@ -124,8 +116,22 @@ def test_so_many_faulty_tables_give_a_bounded_message(tmp_path: Path) -> None:
     assert faults[-1] == "more than 100 faults; must be none (the rest is not listed)"
 
 
+def test_more_walls_than_can_be_measured_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wall = "[[wall]]\nstart = [-1.0, -3.0]\nend = [1.0, -3.0]\n"
+    said = faults_of(TWO + wall * MOST_WALLS, tmp_path)
+    assert any(f"must be at most {MOST_WALLS}" in fault for fault in said), said
+
+    monkeypatch.setattr(tables, "MOST_PAIRS", 7)  # two disks are measured against three walls
+    assert any("must be at most 3" in fault for fault in faults_of(TWO + wall * 2, tmp_path))
+    path = tmp_path / "two.toml"
+    path.write_text(TWO + wall)
+    assert len(read_scene_file(path).scene.walls) == 3
+
+
 def test_touching_disks_are_no_overlap(tmp_path: Path) -> None:
-    """A close-packed heap far from the origin overlaps by its rounding only, and is read."""
+    # a close-packed heap far from the origin overlaps by its rounding
     path = tmp_path / "heap.toml"
     rows = [(i + 0.5 * (j % 2) + 1e3, j * np.sqrt(0.75)) for i in range(12) for j in range(12)]
     position = 0.2 * np.array(rows)
@@ -144,8 +150,6 @@ def test_touching_disks_are_no_overlap(tmp_path: Path) -> None:
 
 
 def test_a_file_reads_as_it_is_written() -> None:
-    """Integers are numbers, a static disk is of infinite mass, the box comes after the free
-    walls."""
     bumper = read_scene_file(SCENES / "bumper.toml")
     assert (bumper.name, bumper.source, bumper.substeps) == ("bumper", "bumper.toml", (2, 6))
     assert bumper.asks == "What do the engines make of bumper?"
@@ -164,7 +168,6 @@ positive = st.floats(1e-3, 1e3)
 
 @st.composite
 def scenarios(draw: st.DrawFn) -> Scenario:
-    """Any scenario whose disks stand apart, in a row far longer than they are wide."""
     n = draw(st.integers(1, 4))
 
     def column(strategy: st.SearchStrategy, *shape: int) -> np.ndarray:
@@ -202,8 +205,6 @@ def scenarios(draw: st.DrawFn) -> Scenario:
 def test_what_is_written_reads_back_bit_for_bit(
     tmp_path_factory: pytest.TempPathFactory, first: Scenario
 ) -> None:
-    """Every array has the same bytes after a round through a file; truth, seed and source stay
-    behind."""
     path = tmp_path_factory.getbasetemp() / "round.toml"
     path.write_text(scene_text(first), encoding="utf-8", newline="\n")
     second = read_scene_file(path)
@@ -225,7 +226,6 @@ def test_what_is_written_reads_back_bit_for_bit(
 def test_the_shift_that_is_named_removes_the_overlap(
     tmp_path_factory: pytest.TempPathFactory, x: float, y: float, tilt: float, wall: bool
 ) -> None:
-    """The disk moved by the printed shift, digits as printed, is accepted."""
     path = tmp_path_factory.getbasetemp() / "shift.toml"
     head = 'name = "shift"\nduration = 1\nsample_interval = 1\nrestitution = 1\n'
     head += "[[disk]]\nradius = 0.25\nstatic = true\n"
@@ -254,7 +254,6 @@ def test_the_shift_that_is_named_removes_the_overlap(
 def test_every_overlap_is_found(
     tmp_path_factory: pytest.TempPathFactory, disks: list[tuple]
 ) -> None:
-    """The search by left edges finds the same pairs as a look at every pair."""
     path = tmp_path_factory.getbasetemp() / "pairs.toml"
     rows = "".join(f"{{position = [{x}, {y}], radius = {r}, static = true}}," for x, y, r in disks)
     path.write_text(

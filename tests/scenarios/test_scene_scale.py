@@ -50,7 +50,6 @@ KEYS = re.findall(r"^(\w+) = [\[\d-]", FULL, re.MULTILINE)
 
 
 def said(text: str, folder: Path) -> list[str]:
-    """What the reader has against a scene; nothing if it can be read. No warning of numpy's."""
     path = folder / "scale.toml"
     path.write_text(text)
     with warnings.catch_warnings():
@@ -63,7 +62,6 @@ def said(text: str, folder: Path) -> list[str]:
 
 
 def replaced(key: str, value: str) -> str:
-    """The full scene with one number (of a pair the first) replaced."""
     text, count = re.subn(
         rf"^{key} = (\[?)[-\d.]+", rf"{key} = \g<1>{value}", FULL, count=1, flags=re.MULTILINE
     )
@@ -78,7 +76,6 @@ def replaced(key: str, value: str) -> str:
 def test_what_is_too_large_is_refused_whatever_it_is_of(
     key: str, value: str, tmp_path: Path
 ) -> None:
-    """One line that names the key and the value."""
     faults = said(replaced(key, value), tmp_path)
     assert len(faults) == 1
     assert re.search(rf"{key}(\[0\])? = ", faults[0])
@@ -89,7 +86,7 @@ def test_what_is_too_large_is_refused_whatever_it_is_of(
 
 @pytest.mark.parametrize("value", ["1e-10", "1e-160", "5e-324"])
 def test_what_has_a_size_must_not_vanish_and_what_has_none_may(value: str, tmp_path: Path) -> None:
-    """A coordinate or a speed of 1e-160 is a zero, rounded; a radius is no radius."""
+    # A coordinate or a speed of 1e-160 is a zero, rounded; a radius is no radius.
     for key in ("duration", "sample_interval", "radius", "mass"):
         (fault,) = said(replaced(key, value), tmp_path)
         assert "out of scale; must be from 1e-09 to 1e+09 (SI)" in fault
@@ -100,7 +97,6 @@ def test_what_has_a_size_must_not_vanish_and_what_has_none_may(value: str, tmp_p
 
 
 def test_walls_and_boxes_have_a_size(tmp_path: Path) -> None:
-    """What is as long as a rounding has no direction."""
     wall = FULL.replace("end = [3.0, -1.0]", "end = [-3.0, -0.9999999999]")
     assert said(wall, tmp_path)[0].startswith(
         "wall[0].end = [-3.0, -0.9999999999]: out of scale: a wall of 1e-10 m;"
@@ -118,21 +114,17 @@ def test_walls_and_boxes_have_a_size(tmp_path: Path) -> None:
 def test_any_number_anywhere_is_read_or_refused_in_a_sentence(
     tmp_path_factory: pytest.TempPathFactory, key: str, value: float
 ) -> None:
-    """No exception of another kind and no warning: numbers of this scale leave float64 nowhere."""
     for fault in said(replaced(key, repr(value)), tmp_path_factory.getbasetemp()):
         assert "must " in fault
 
 
 @pytest.mark.parametrize("count", [10_000_001, 10**9, 10**40, 10**400])
 def test_too_many_substeps_are_blamed_for_being_too_many(count: int, tmp_path: Path) -> None:
-    """They are whole."""
     (fault,) = said(TWO.replace("= 0.02", f"= 0.02\nsubsteps = [{count}]"), tmp_path)
     assert fault.endswith(": more than 10000000 steps in all; must give at most 10000000")
 
 
 def test_what_is_no_file_is_refused_at_once(tmp_path: Path) -> None:
-    """A pipe into which nobody writes, a socket, a device that never ends, a folder; linked to or
-    not."""
     os.mkfifo(pipe := tmp_path / "pipe.toml")
     (zero := tmp_path / "zero.toml").symlink_to("/dev/zero")
     (linked := tmp_path / "linked.toml").symlink_to(pipe)
@@ -170,7 +162,7 @@ def test_the_step_that_is_suggested_is_accepted(
     substeps: int,
     asked: float,
 ) -> None:
-    """Digits as printed: six of them stood for another step, which was refused as well."""
+    # digits as printed: six of them stood for another step, which was refused as well
     path = tmp_path_factory.getbasetemp() / "steps.toml"
     text = TWO.replace("= 0.02", f"= {interval!r}\nsubsteps = [{substeps}]")
     path.write_text(re.sub(r"(?m)^duration = .*$", f"duration = {interval * samples!r}", text))

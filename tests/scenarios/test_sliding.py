@@ -21,14 +21,12 @@ FIELDS = ("position", "velocity", "angle", "angular_velocity")
 
 
 def truth_of(one: Scenario) -> Trajectory:
-    """At its samples."""
     assert one.truth is not None
     return one.truth(one.times)
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_closed_forms_with_friction_are_what_two_computations_find(name: str):
-    """The oracle and the event engine, in places, speeds, angles, spins and impulses."""
     one = scenario(name)
     expected, record = truth_of(one), computed(one)
     exact = record.sampled(one.scene, one.thrusts, one.times)
@@ -50,7 +48,6 @@ def test_closed_forms_with_friction_are_what_two_computations_find(name: str):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_wrong_friction_would_be_seen(name: str):
-    """Negative control: a thousandth less friction is another motion by far more than rounding."""
     one = scenario(name)
     # Where friction is more than enough, a little less is so, too.
     share = 0.5 if name == "spin_to_flight_and_back" else 0.999
@@ -65,7 +62,7 @@ def test_a_wrong_friction_would_be_seen(name: str):
     [(0.0, 0.1, 4.5, 4.0), (0.5, 0.1, 4.25, 6.0), (1.0, 0.1, 4.0, 8.0), (1.0, 0.5, 10 / 3, 40 / 3)],
 )
 def test_a_bounce_has_the_speed_and_spin_worked_out_by_hand(restitution, friction, speed, spin):
-    """A solid disk of 0.25 m at (5, -5) m/s; the last one sticks."""
+    # a solid disk of 0.25 m at (5, -5) m/s; the last one sticks
     v, w = bounced(
         np.array([[5.0, -5.0]]),
         np.zeros(1),
@@ -80,13 +77,12 @@ def test_a_bounce_has_the_speed_and_spin_worked_out_by_hand(restitution, frictio
 
 
 def ways(legs: Legs, t: float) -> tuple[float, float]:
-    """Speed and spin at `t` s."""
     speed, spin = legs.at(np.array([t]))[1][0]
     return float(speed), float(spin)
 
 
 def test_a_slide_becomes_a_roll_at_two_thirds_of_its_speed():
-    """At v / (3 mu g), for a solid disk; a hoop keeps half of it."""
+    # at v / (3 mu g), for a solid disk; a hoop keeps half of it
     legs = slide(3.0, 0.0, 0.5, 2.0, 0.2, 0.0, 10.0)
     assert legs.start[1] == pytest.approx(0.5, rel=1e-15)
     assert ways(legs, 0.6) == pytest.approx((2.0, -4.0), rel=1e-15)
@@ -95,8 +91,7 @@ def test_a_slide_becomes_a_roll_at_two_thirds_of_its_speed():
 
 @pytest.mark.parametrize(("k", "tangent"), [(2.0, 0.75), (1.0, 0.5), (2.5, 0.875)])
 def test_a_disk_slides_on_slopes_steeper_than_mu_times_one_plus_k(k: float, tangent: float):
-    """Friction 1/4; k = m r2 / I of a solid disk, a hoop, a ball. Below it has no slip, above it
-    has."""
+    # friction 1/4; k = m r2 / I of a solid disk, a hoop, a ball
     for by, slips in ((0.999, False), (1.001, True)):
         legs = slide(0.0, 0.0, 0.5, k, 0.25, 10.0 * tangent * by, 10.0)
         speed, spin = ways(legs, 1.0)
@@ -104,13 +99,10 @@ def test_a_disk_slides_on_slopes_steeper_than_mu_times_one_plus_k(k: float, tang
 
 
 def test_the_oracle_slides_from_the_same_slope_on():
-    """Its decision is proven on either side of the 3-4-5 slope, with friction 1/4."""
     for mu, slips in ((0.2501, False), (0.2499, True)):
         scene = lay_out(
-            position=[[0.1875, 0.25]],
-            velocity=[[0.0, 0.0]],
-            radius=[0.3125],
-            mass=[1.0],
+            [[0.1875, 0.25]],
+            radius=0.3125,
             walls=[[[-4, 3], [4, -3]]],
             gravity=[0.0, -10.0],
             restitution=0.5,

@@ -22,10 +22,10 @@ from crosscheck2d.scenarios.no_truth import NoTruth
 from crosscheck2d.scenarios.truth import cache as truth_cache
 from crosscheck2d.scenarios.truth import exact as oracle
 from crosscheck2d.scenarios.truth.exact import computed, with_oracle
-from crosscheck2d.scenarios.truth.oracle import work as oracle_work
+from crosscheck2d.scenarios.truth.oracle import path as oracle_path
 from crosscheck2d.scenarios.truth.oracle.events import trace
 from crosscheck2d.scenarios.truth.oracle.numbers import Undecided, balls, digits, has_balls
-from crosscheck2d.scenarios.truth.oracle.work import TimeLimit
+from crosscheck2d.scenarios.truth.oracle.path import TimeLimit
 from crosscheck2d.scenarios.truth.record import TruthRecord
 from tests.reports.terminal.command_line import crosscheck
 
@@ -50,28 +50,23 @@ mass = 1.0
 
 
 def boxed(speed: float = 1.1) -> Scenario:
-    """Two disks that cross a box for some hundred collisions."""
     scene = lay_out(
-        position=[[0.3, 0.4], [0.7, 0.6]],
-        velocity=[[speed, 0.7], [-0.4, 0.9]],
-        radius=[0.05, 0.05],
-        mass=[1.0, 1.0],
+        [[0.3, 0.4], [0.7, 0.6]],
+        [[speed, 0.7], [-0.4, 0.9]],
+        radius=0.05,
         walls=box([0.0, 0.0], [1.0, 1.0]),
-        restitution=1.0,
     )
     return with_oracle(Scenario("boxed", "?", "", scene, 12.0, 0.05))
 
 
 @pytest.fixture
 def ticking(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A clock that is looked at gets on by a second, so that the same step is the last on every
-    machine."""
+    """Looked at it gets on by a second, so that the same step is the last on every machine."""
     ticks = count()
-    monkeypatch.setattr(oracle_work, "monotonic", lambda: float(next(ticks)))
+    monkeypatch.setattr(oracle_path, "monotonic", lambda: float(next(ticks)))
 
 
 def begins_as(short: TruthRecord, whole: TruthRecord) -> bool:
-    """Whether all that the shorter record has is in the longer one, to the bit."""
     until = short.horizon
     here, there = (record.legs[record.legs[:, 1] <= until] for record in (short, whole))
     events, others = (record.events[record.events[:, 0] <= until] for record in (short, whole))
@@ -81,8 +76,6 @@ def begins_as(short: TruthRecord, whole: TruthRecord) -> bool:
 @pytest.mark.usefixtures("ticking")
 @pytest.mark.parametrize("kind", KINDS)
 def test_an_answer_that_time_ends_is_the_beginning_of_the_whole_one(kind: Callable):
-    """To the bit, in the numbers that prove and in those of two precisions; it says what ended it,
-    and when."""
     clock = TimeLimit(CUT, REASON)
     short, whole = computed(boxed(), kind, clock), computed(boxed(), kind)
 
@@ -97,7 +90,6 @@ def test_an_answer_that_time_ends_is_the_beginning_of_the_whole_one(kind: Callab
 
 @pytest.mark.usefixtures("ticking")
 def test_a_last_place_in_the_start_is_another_beginning():
-    """The control: what was compared above is compared to the bit."""
     short = computed(boxed(float(np.nextafter(1.1, 2))), digits, TimeLimit(CUT, REASON))
 
     assert not begins_as(short, computed(boxed(), digits))
@@ -107,8 +99,6 @@ def test_a_last_place_in_the_start_is_another_beginning():
 @pytest.mark.parametrize("seconds", [3.0, 30.0, 300.0, 3000.0])
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_is_given_of_a_chaotic_motion_is_exact(kind: Callable, seconds: float):
-    """Whichever attempt in how many bits the time ended: it is within the error bounds of the whole
-    answer."""
     one = scenario("line_gas")
     short, whole = computed(one, kind, TimeLimit(seconds, REASON)), computed(one, kind)
     until = min(short.horizon, whole.horizon, one.duration)
@@ -124,7 +114,6 @@ def test_what_is_given_of_a_chaotic_motion_is_exact(kind: Callable, seconds: flo
 @pytest.mark.skipif(not has_balls(), reason="needs python-flint")
 @pytest.mark.usefixtures("ticking")
 def test_more_time_never_gives_less():
-    """Of several attempts the one that got farthest counts, not the one that was under way."""
     one = scenario("line_gas")
     reached = [
         min(computed(one, None, TimeLimit(float(s), REASON)).horizon, one.duration)
@@ -137,8 +126,6 @@ def test_more_time_never_gives_less():
 
 @pytest.mark.skipif(not has_balls(), reason="needs python-flint")
 def test_an_answer_ends_before_its_balls_are_too_wide():
-    """In few bits a chaotic motion is soon lost: it is cut to where it is exact, to the last
-    place."""
     one, accuracy = scenario("line_gas"), 1e-12
     with pytest.raises(Undecided) as lost:
         trace(one.scene, [], one.duration, balls(56))
@@ -146,13 +133,12 @@ def test_an_answer_ends_before_its_balls_are_too_wide():
     end, error = oracle.exact_until(path, one.duration, accuracy)
 
     assert 0 < end < lost.value.t
-    assert error < accuracy <= oracle.spread(path, one.duration)
+    assert error < accuracy <= oracle.widest(oracle.widths(path), path.end)
     assert oracle.widest(oracle.widths(path), end * (1 + 1e-9)) >= accuracy
 
 
 @pytest.mark.usefixtures("ticking")
 def test_what_depends_on_the_machine_is_not_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """The next one computes it anew, and what has no limit of time is kept as ever."""
     monkeypatch.setenv("CROSSCHECK_CACHE", str(tmp_path))
     one = boxed()
     record_of(one, TimeLimit(CUT, REASON))
@@ -168,16 +154,15 @@ def test_what_depends_on_the_machine_is_not_kept(tmp_path: Path, monkeypatch: py
 def test_where_time_ends_before_the_first_sample_there_is_no_answer(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    """And that is said."""
     monkeypatch.setenv("CROSSCHECK_CACHE", str(tmp_path))
     with pytest.raises(NoTruth, match=REASON):
         record_of(replace(boxed(), sample_interval=0.5), TimeLimit(0.0, REASON))
 
 
 def by_processor_time(scene: str, seed: int, timeout: float) -> TruthRecord | str:
-    """`compute_record` on a clock that stands still while other processes run; fails if it takes
-    longer than `timeout`, after which its worker would be stopped."""
-    with mock.patch.object(oracle_work, "monotonic", process_time):
+    """On a clock that stands still while other processes run; fails if it takes longer than
+    `timeout`."""
+    with mock.patch.object(oracle_path, "monotonic", process_time):
         began = process_time()
         record = compute_record(scene, seed, timeout)
         assert process_time() - began < timeout
@@ -188,8 +173,8 @@ def by_processor_time(scene: str, seed: int, timeout: float) -> TruthRecord | st
 def test_an_endless_scene_is_answered_up_to_the_limit_of_time(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    """A disk in a box for 10^6 s: exit 0, and how far it got; a part of the limit is for
-    following it, so short that time ends before the work that is allowed."""
+    # A part of the limit is for following it, so short that time ends before the work that is
+    # allowed.
     monkeypatch.setenv("CROSSCHECK_CACHE", str(tmp_path / "cache"))
     monkeypatch.setattr(truth, "compute_record", by_processor_time)
     # on a busy machine 6 s of work take longer than 6 s

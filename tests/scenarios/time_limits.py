@@ -41,7 +41,6 @@ def each_within(
 def send_each(
     to: Connection, limit: float, work: Callable[[Item], Made], items: list[Item]
 ) -> None:
-    """In the child: one result after the other, each in a tuple; the timer starts anew for each."""
     signal.signal(signal.SIGPROF, signal.SIG_DFL)
     for item in items:
         signal.setitimer(signal.ITIMER_PROF, limit)
@@ -49,7 +48,6 @@ def send_each(
 
 
 def received(source: Connection) -> tuple | None:
-    """The next result, or None if there will be none."""
     try:
         return source.recv()
     except EOFError:

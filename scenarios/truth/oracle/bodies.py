@@ -10,10 +10,16 @@ from typing import NamedTuple
 import numpy as np
 
 from crosscheck2d.scenarios.model import Array, Scene, Thrust
-from crosscheck2d.scenarios.truth.oracle.friction import Friction, limited
 from crosscheck2d.scenarios.truth.oracle.jets import count_pieces, push
 from crosscheck2d.scenarios.truth.oracle.numbers import Number, Numbers
-from crosscheck2d.scenarios.truth.oracle.ties import CollisionLaw, Contact, Touch, Velocity
+from crosscheck2d.scenarios.truth.oracle.ties import (
+    CollisionLaw,
+    Contact,
+    Friction,
+    Touch,
+    Velocity,
+    limited,
+)
 
 STATIC, FALLING = 0, 1
 """Kinds of acceleration: none, gravity; each disk under a thrust is a kind of its own, from 2 on;
@@ -71,29 +77,8 @@ class Frame(NamedTuple):
 
 
 class Bodies:
-    """n disks and, as static disks of radius 0, the ends of the walls; b of them together.
-
-    Attributes:
-        legs: (b,) the leg each body is on.
-        count: (b,) events each has had.
-        table, radii: (b, 7) and (b,) the legs as float64, see `filter.py`, and the radii, m.
-        shape: (b,) whether each leg is a point, a straight line or a parabola.
-        asleep: (b,) whether the bounces of each die out without another contact: it is then left
-            out of all searches.
-        held: (b,) the contacts each rests on: gap 0, no speed and no acceleration along the normal.
-        group: (b,) the disks that move as one with each, because forces keep them in contact.
-        common: (b,) the kind of such a group and its acceleration, m/s2; else None.
-        separated: pair -> the event counts of both when they touched and did not approach.
-        in_step: the same for pairs that touched and had exactly the same velocity.
-        leaning: (b,) the walls that each touched without approach at the start of its leg.
-        law: masses, restitution and friction.
-        rates: (b,) rad/s2, angular acceleration by torques; used only with friction.
-        no_slip_on: (b,) the wall on which each has exactly no slip since the collision at the start
-            of its leg.
-        sliding: (b,) the sign of the slip of a disk that rests on a wall with friction.
-        snug: the bodies of a pair, or disk, wall and side -> m, the distance of their centres, or
-            of centre and wall, where they touch at the start but for a rounding.
-    """
+    """n disks and, as static disks of radius 0, the ends of the walls; each list has an entry for
+    each of them."""
 
     def __init__(self, scene: Scene, k: Numbers, turning: bool = False) -> None:
         self.k, self.scene, exact = k, scene, k.exact
@@ -122,11 +107,13 @@ class Bodies:
             self.kind = [STATIC] * len(self.legs)
         # The kind and the acceleration of each in free flight.
         self.free = [(kind, leg.ax, leg.ay) for kind, leg in zip(self.kind, self.legs)]
-        self.count = [0] * len(self.legs)
+        self.count = [0] * len(self.legs)  # events each has had
         self.radii = np.append(scene.radius, np.zeros(len(ends)))
         self.radius = [exact(r) for r in self.radii.tolist()]
+        # the legs as float64, see `filter.py`
         self.table = np.array([[float(x) for x in (*leg[1:7], leg.t)] for leg in self.legs])
         self.shape = [shape_of(row) for row in self.table.tolist()]
+        # whether the bounces of each die out without another contact: left out of all searches
         self.asleep = np.zeros(len(self.legs), bool)
         mass = [exact(m) if np.isfinite(m) else None for m in scene.mass.tolist()]
         inverse = [nought if m is None else exact(1.0) / m for m in mass] + [nought] * len(ends)
@@ -134,20 +121,29 @@ class Bodies:
             k, inverse, exact(scene.restitution), scene.restitution == 0, self._friction()
         )
         self.walls = [_frame(k, wall) for wall in scene.walls.tolist()]
+        # pair -> the event counts of both when they touched and did not approach; or when they had
+        # exactly the same velocity
         self.separated: dict[tuple[int, int], tuple[int, int]] = {}
         self.in_step: dict[tuple[int, int], tuple[int, int]] = {}
+        # the disks that move as one with each, because forces keep them in contact; and the kind of
+        # such a group and its acceleration, m/s2
         self.group: list[frozenset[int]] = [frozenset() for _ in self.legs]
         self.common: list[tuple[int, Number, Number] | None] = [None for _ in self.legs]
+        # the walls that each touched without approach at the start of its leg
         self.leaning: list[set[Contact]] = [set() for _ in self.legs]
+        # the contacts each rests on: gap 0, no speed and no acceleration along the normal
         self.held: list[tuple[Contact, ...]] = [() for _ in self.legs]
+        # rad/s2, angular acceleration by torques; used only with friction
         self.nought, self.rates = nought, [nought for _ in self.legs]
         self.jet: list[tuple[Number, Number] | None] = [None for _ in self.legs]
+        # the wall on which each has exactly no slip since the collision at the start of its leg
         self.no_slip_on: list[Contact | None] = [None for _ in self.legs]
-        self.sliding = [0 for _ in self.legs]
+        self.sliding = [0 for _ in self.legs]  # sign of the slip on a wall with friction
+        # the bodies of a pair, or disk, wall and side -> m, the distance of their centres, or of
+        # centre and wall, where they touch at the start but for a rounding
         self.snug: dict[tuple[int, ...], Number] = {}
 
     def _friction(self) -> Friction | None:
-        """The data for friction; None without friction."""
         scene, exact = self.scene, self.k.exact
         if not scene.friction:
             return None
@@ -165,17 +161,14 @@ class Bodies:
         return contact.j if contact.j < n else -1 - self.owner[contact.j - n]
 
     def pair(self, contact: Contact) -> tuple[int, int]:
-        """Both disks, the lower number first; or the disk and -1 - wall."""
         i, j = contact.i, self.partner(contact)
         return (i, j) if j < 0 or i < j else (j, i)
 
     def name(self, contact: Contact) -> str:
-        """The other side of a contact, in words."""
         j = self.partner(contact)
         return f"disk {j}" if j >= 0 else f"wall {-1 - j}"
 
     def state_at(self, i: int, now: Number) -> tuple[Number, Number, Number, Number]:
-        """x, y m and vx, vy m/s of body i: x + v t + a t^2 / 2, v + a t."""
         leg = self.legs[i]
         if leg.jet is not None and leg.t is not now:
             return self.pushed(leg, now)
@@ -193,7 +186,6 @@ class Bodies:
         )
 
     def pushed(self, leg: Leg, now: Number) -> tuple[Number, Number, Number, Number]:
-        """x, y m and vx, vy m/s on a leg with a thrust that turns with the disk."""
         s, k, turn = now - leg.t, self.k, leg.turn
         assert turn is not None
         assert leg.jet is not None
@@ -207,12 +199,10 @@ class Bodies:
         return x, y, vx + du, vy + dv
 
     def velocity_at(self, i: int, now: Number) -> Velocity:
-        """vx, vy m/s, and rad/s where there is friction."""
         _, _, vx, vy = self.state_at(i, now)
         return vx, vy, self.turn_at(i, now).spin
 
     def turn_at(self, i: int, now: Number) -> Turn:
-        """The rotation of body i; zeros without friction."""
         leg = self.legs[i]
         if leg.turn is None:
             return Turn(self.nought, self.nought, self.nought)
@@ -222,8 +212,6 @@ class Bodies:
         return Turn(angle + (spin + rate * s / 2) * s, spin + rate * s, rate)
 
     def fly(self, i: int, now: Number, v: Velocity, beside: Contact | None = None) -> None:
-        """Body i goes on from here with velocity v, resting on the same contacts; placed exactly on
-        the wall `beside`, if given."""
         x, y, _, _ = self.state_at(i, now)
         if beside is not None:
             x, y = self.beside(beside, x, y)
@@ -231,13 +219,11 @@ class Bodies:
         self.begin(i, self.leg(i, now, x, y, v))
 
     def leg(self, i: int, now: Number, x: Number, y: Number, v: Velocity) -> Leg:
-        """A leg of body i from (x, y) m with velocity v, on the contacts it rests on."""
         (vx, vy, spin), (ax, ay, rate) = v, self.acceleration(i)
         turn = Turn(self.turn_at(i, now).angle, spin, rate) if self.turning else None
         return Leg(now, x, y, vx, vy, ax, ay, turn=turn, jet=self.jet[i])
 
     def across(self, edge: Contact, now: Number) -> None:
-        """Move a disk that has reached an edge of the wrap to the opposite edge."""
         assert self.scene.wrap is not None
         i, place = edge.i, list(self.state_at(edge.i, now))
         place[edge.j] = self.k.exact(float(self.scene.wrap[0 if edge.side > 0 else 1, edge.j]))
@@ -247,7 +233,6 @@ class Bodies:
         self.begin(i, self.leg(i, now, x, y, (vx, vy, spin)))
 
     def set_thrusts(self, i: int, now: Number, thrusts: Sequence[Thrust]) -> None:
-        """Body i is accelerated by all of `thrusts` from now on."""
         exact, inverse = self.k.exact, self.law.inverse_mass[i]
         a = [exact(g) for g in (self.scene.gravity * (not self.scene.static[i])).tolist()]
         jet = [self.nought, self.nought]
@@ -292,27 +277,21 @@ class Bodies:
         """
         self.asleep[i] = False
         self.held[i], self.common[i] = contacts, common
-        touched_now = self.touched_now(i, now)
+        # What has been noted at this instant holds on another acceleration, too.
+        noted = [
+            (pairs, pair)
+            for pairs in (self.separated, self.in_step)
+            for pair, counts in pairs.items()
+            if i in pair
+            and counts == (self.count[pair[0]], self.count[pair[1]])
+            and self.legs[i].t is now
+        ]
         if contacts and self.law.friction is not None:
             self.sliding[i] = 0 if rolls else self.k.sign(self.slip(contacts[0], v))
         x, y, _, _ = self.state_at(i, now)
         self.begin(i, self.leg(i, now, x, y, v))
-        for pairs, pair in touched_now:
+        for pairs, pair in noted:
             pairs[pair] = self.count[pair[0]], self.count[pair[1]]
-
-    def touched_now(
-        self, i: int, now: Number
-    ) -> list[tuple[dict[tuple[int, int], tuple[int, int]], tuple[int, int]]]:
-        """The entries of `separated` and `in_step` that body i has got at this instant: they hold
-        on another acceleration, too."""
-        if self.legs[i].t is not now:
-            return []
-        return [
-            (pairs, pair)
-            for pairs in (self.separated, self.in_step)
-            for pair, counts in pairs.items()
-            if i in pair and counts == (self.count[pair[0]], self.count[pair[1]])
-        ]
 
     def slip(self, contact: Contact, v: Velocity) -> Number:
         """m/s, the velocity of the contact point along the wall, positive from its start to its
@@ -321,7 +300,6 @@ class Bodies:
         return tx * v[0] + ty * v[1] + contact.side * self.radius[contact.i] * v[2]
 
     def begin(self, i: int, leg: Leg) -> None:
-        """Put body i on a new leg."""
         self.legs[i] = leg = leg._replace(held=self.held[i])
         row = [float(x) for x in (*leg[1:7], leg.t)]
         self.table[i], self.shape[i] = row, shape_of(row)
@@ -330,7 +308,7 @@ class Bodies:
         self.no_slip_on[i] = None
 
     def acceleration(self, i: int) -> tuple[Number, Number, Number]:
-        """ax, ay m/s2 and rad/s2 of body i on the contacts it rests on; also sets its kind."""
+        """m/s2, m/s2 and rad/s2 on the contacts that body i rests on; also sets its kind."""
         if (common := self.common[i]) is not None:
             self.kind[i] = common[0]
             return common[1], common[2], self.rates[i]
@@ -345,17 +323,14 @@ class Bodies:
             if kind == FALLING:
                 level = square_to(self.scene.walls[walls[0].j], self.scene.gravity)
                 kind, along = (STATIC, self.k.exact(0.0)) if level else (-1 - walls[0].j, along)
-            if self.law.friction is not None and not (kind == STATIC and self.lies(i)):
+            # On a level wall friction does not act without slip and torque.
+            lies = kind == STATIC and not self.sliding[i] and self.rates[i] is self.nought
+            if self.law.friction is not None and not lies:
                 kind = 2 + i
                 along, rate = self.rubbed(walls[0], along, load, self.law.friction)
             ax, ay = along * tx, along * ty
         self.kind[i] = kind
         return ax, ay, rate
-
-    def lies(self, i: int) -> bool:
-        """Whether friction does not act on a body that rests on a level wall: no slip and no
-        torque."""
-        return not self.sliding[i] and self.rates[i] is self.nought
 
     def rubbed(
         self, contact: Contact, along: Number, load: Number, friction: Friction
@@ -390,12 +365,11 @@ class Bodies:
                 self.leaning[contact.i].add(contact)
 
     def keep_in_step(self, contact: Contact) -> None:
-        """Note that both bodies of a contact touch and have exactly the same velocity."""
         i, j = sorted((contact.i, contact.j))
         self.separated[i, j] = self.in_step[i, j] = self.count[i], self.count[j]
 
     def height(self, contact: Contact, x: Number, y: Number) -> Number:
-        """m from the line of the wall to (x, y), positive on the contact's side of it."""
+        """m from the line of the wall, positive on the contact's side of it."""
         px, py, tx, ty, _ = self.walls[contact.j]
         return contact.side * (tx * (y - py) - ty * (x - px))
 
@@ -407,28 +381,23 @@ class Bodies:
         return self.snug.get((i, j, contact.side)) or self.radius[i]
 
     def foot(self, wall: int, x: Number, y: Number) -> Number:
-        """m along the wall from its start to the point closest to (x, y)."""
         px, py, tx, ty, _ = self.walls[wall]
         return tx * (x - px) + ty * (y - py)
 
     def foot_on(self, wall: int, x: Number, y: Number) -> bool:
-        """Whether the foot of (x, y) lies on the wall, or on an end of it."""
         foot, sign = self.foot(wall, x, y), self.k.sign
         return sign(foot) >= 0 and sign(self.walls[wall].length - foot) >= 0
 
     def outward(self, contact: Contact, x: Number, y: Number) -> Number:
-        """The part of a vector (x, y) away from the wall, on the contact's side."""
         _, _, tx, ty, _ = self.walls[contact.j]
         return contact.side * (tx * y - ty * x)
 
     def slide(self, contact: Contact, x: Number, y: Number) -> tuple[Number, Number]:
-        """The part of a vector (x, y) along the wall."""
         _, _, tx, ty, _ = self.walls[contact.j]
         part = tx * x + ty * y
         return part * tx, part * ty
 
     def beside(self, contact: Contact, x: Number, y: Number) -> tuple[Number, Number]:
-        """The position nearest to (x, y) at which disk contact.i touches the wall exactly."""
         px, py, tx, ty, _ = self.walls[contact.j]
         foot, away = self.foot(contact.j, x, y), contact.side * self.reach(contact)
         return px + foot * tx - away * ty, py + foot * ty + away * tx
@@ -443,14 +412,12 @@ class Bodies:
 
 
 def shape_of(row: Sequence[float]) -> int:
-    """The shape of a leg given as float64 x, y, vx, vy, ax, ay, t."""
     if row[4] or row[5]:
         return CURVED
     return STRAIGHT if row[2] or row[3] else STILL
 
 
 def rational(vector: Array) -> tuple[Fraction, Fraction]:
-    """The float64 numbers of a vector (2,) as exact fractions."""
     return Fraction(float(vector[0])), Fraction(float(vector[1]))
 
 
@@ -465,8 +432,8 @@ def nearest(points: Array, walls: Array) -> tuple[Array, Array]:
 
 
 def square_to(wall: Array, tip: Array, foot: Array | None = None) -> bool:
-    """Whether a wall is perpendicular to the vector from `foot` (default 0, 0) to `tip`, in
-    rationals."""
+    """Whether a wall is perpendicular to the vector from `foot` (default 0, 0) to `tip`,
+    exactly."""
     (px, py), (qx, qy) = rational(wall[0]), rational(wall[1])
     (x, y), (ox, oy) = rational(tip), rational(np.zeros(2) if foot is None else foot)
     return (qx - px) * (x - ox) + (qy - py) * (y - oy) == 0

@@ -25,7 +25,6 @@ MARGIN = 1.5  # every order stays by this factor below the ratio at which collis
 
 
 def is_m_matrix(k: Numbers, matrix: Sequence[Sequence[Number]]) -> bool:
-    """Whether no entry off the diagonal of a Delassus matrix is positive."""
     n = range(len(matrix))
     return not any(k.sign(matrix[a][b]) > 0 for a in n for b in n if a != b)
 
@@ -68,7 +67,7 @@ def complementary(
 def solve(
     k: Numbers, matrix: Sequence[Sequence[Number]], right: Sequence[Number]
 ) -> list[Number] | None:
-    """The solution of a symmetric positive definite system; None where a pivot is 0."""
+    """Of a symmetric positive definite system; None where a pivot is 0."""
     n, rows = len(right), [[*row, value] for row, value in zip(matrix, right)]
     for a in range(n):
         if k.sign(rows[a][a]) <= 0:

@@ -56,7 +56,6 @@ class ContactFinder:
         return sorted(found)
 
     def contact(self, i: int, code: int) -> Contact:
-        """The contact of disk i with a code of `soonest`."""
         wall, right = divmod(code - len(self.bodies.legs), 2)
         return Contact("wall", i, wall, 1 - 2 * right) if wall >= 0 else Contact("body", i, code)
 
@@ -92,7 +91,6 @@ class ContactFinder:
                 yield bound, contact
 
     def _edges(self, i: int) -> Iterator[Contact]:
-        """The edges of the wrap that disk i may reach."""
         velocity, acceleration = self.bodies.table[i, 2:4], self.bodies.table[i, 4:6]
         for axis in (0, 1):
             for side in (1, -1):
@@ -100,7 +98,6 @@ class ContactFinder:
                     yield Contact("edge", i, axis, side)
 
     def _holds(self, contact: Contact) -> bool:
-        """Whether disk i rests on this contact, or on a wall with this end on its line."""
         held = self.bodies.held[contact.i]
         if contact.kind == "body":
             return contact in held or any(
@@ -109,17 +106,15 @@ class ContactFinder:
         return any(c.kind == "wall" and contact.j in self.surface[c.j] for c in held)
 
     def time_to(self, contact: Contact, now: Number, limit: float) -> Number | None:
-        """s from `now` to this contact, or None if it does not come within `limit` s. Raises
-        `Pressed`."""
-        if contact.kind == "edge":
-            return self._time_to_edge(contact, now)
-        if contact.kind == "end":
-            return self._time_to_end(contact, now)
-        if contact.kind == "slip end":
-            return self._time_to_grip(contact, now)
-        if contact.kind == "wall":
-            return self._time_to_wall(contact, now)
-        return self._time_to_body(contact, now, limit)
+        """s from `now`; None if the contact does not come within `limit` s. Raises `Pressed`."""
+        if contact.kind == "body":
+            return self._time_to_body(contact, now, limit)
+        return {
+            "edge": self._time_to_edge,
+            "end": self._time_to_end,
+            "slip end": self._time_to_grip,
+            "wall": self._time_to_wall,
+        }[contact.kind](contact, now)
 
     def _time_to_body(self, contact: Contact, now: Number, limit: float) -> Number | None:
         bodies, i, j = self.bodies, contact.i, contact.j
@@ -162,8 +157,7 @@ class ContactFinder:
         return after if bodies.foot_on(contact.j, x, y) else None
 
     def _above(self, wall: int, x: Number, y: Number, u: Number, v: Number) -> bool:
-        """Whether the foot of a point (x, y) lies on the wall, and its velocity (u, v) does not
-        move it off an end."""
+        """Whether the foot of (x, y) lies on the wall and (u, v) does not move it off an end."""
         frame, foot = self.bodies.walls[wall], self.bodies.foot(wall, x, y)
         heading = frame.tx * u + frame.ty * v
         for left, leaving in ((foot, -heading), (frame.length - foot, heading)):
@@ -172,8 +166,7 @@ class ContactFinder:
         return True
 
     def _time_to_end(self, contact: Contact, now: Number) -> Number | None:
-        """s until the contact point of a disk that rests on a wall reaches the wall's end (side 1)
-        or start (side -1)."""
+        """s until the foot of a resting disk reaches its wall's end (side 1) or start (side -1)."""
         bodies, leg, wall = self.bodies, self.bodies.legs[contact.i], self.bodies.walls[contact.j]
         x, y, u, v = bodies.state_at(contact.i, now)
         foot, speed = bodies.foot(contact.j, x, y), wall.tx * u + wall.ty * v
@@ -182,7 +175,6 @@ class ContactFinder:
         return crossing(self.k, left, -contact.side * speed, -contact.side * acceleration)
 
     def _time_to_grip(self, contact: Contact, now: Number) -> Number | None:
-        """s until the slip of a disk on a wall with friction ends; None if it does not."""
         bodies, i = self.bodies, contact.i
         leg, way = bodies.legs[i], bodies.sliding[i]
         assert leg.turn is not None
@@ -204,7 +196,6 @@ class ContactFinder:
         return crossing(self.k, gap, speed, acceleration)
 
     def touch(self, contact: Contact, now: Number) -> Touch:
-        """The contact with its direction, at `now`."""
         bodies = self.bodies
         if contact.kind == "body":
             x, y, _, _ = bodies.state_at(contact.i, now)
@@ -214,7 +205,6 @@ class ContactFinder:
         return Touch(contact, contact.side * wall.ty, -contact.side * wall.tx)
 
     def touching(self, i: int, now: float) -> list[Contact]:
-        """The contacts of disk i that may have no gap at `now` s, by float64."""
         bodies = self.bodies
         count = touching(
             bodies.table, bodies.radii, bodies.asleep, self.scene.walls, i, now, self.codes
@@ -222,7 +212,6 @@ class ContactFinder:
         return [self.contact(i, code) for code in self.codes[:count].tolist()]
 
     def alone(self, contact: Contact, now: float) -> bool:
-        """Whether the disks of a contact certainly touch nothing else."""
         return not any(
             self.bodies.held[i] or {key(other) for other in self.touching(i, now)} - {key(contact)}
             for i in contact.disks
@@ -237,10 +226,14 @@ class ContactFinder:
         for contact in self.touching(i, float(now)):
             if key(contact) in known:
                 continue
-            if self.touches_now(contact, now):
-                found.append((contact, 0))
-                continue
             if contact.kind == "body":
+                (a, b), legs = sorted((contact.i, contact.j)), bodies.legs
+                # a pair that is known to touch at this instant, without approach
+                counts = bodies.count[a], bodies.count[b]
+                at_once = legs[a].t is now or legs[b].t is now
+                if at_once and bodies.separated.get((a, b)) == counts:
+                    found.append((contact, 0))
+                    continue
                 touch, reach = self.touch(contact, now), bodies.reach(contact)
                 gap = self.k.sign(touch.dx * touch.dx + touch.dy * touch.dy - reach * reach)
                 within = True
@@ -249,15 +242,6 @@ class ContactFinder:
                 within = bodies.foot_on(contact.j, x, y)
             found += [(contact, gap)] if gap <= 0 and within else []
         return found
-
-    def touches_now(self, contact: Contact, now: Number) -> bool:
-        """Whether a pair of disks is known to touch at this instant, without approach."""
-        if contact.kind != "body":
-            return False
-        i, j = sorted((contact.i, contact.j))
-        legs, count = self.bodies.legs, self.bodies.count
-        at_once = legs[i].t is now or legs[j].t is now
-        return at_once and self.bodies.separated.get((i, j)) == (count[i], count[j])
 
     def cluster(self, contacts: Sequence[Contact], now: Number) -> list[Touch]:
         """All contacts that touch now, of the disks in `contacts` and of all disks connected to
@@ -295,8 +279,7 @@ def line_span(along: np.ndarray, wall: np.ndarray) -> tuple[float, float]:
 
 
 def points_in_line(wall: np.ndarray, points: np.ndarray) -> list[int]:
-    """The points (p, 2) that lie on the line of a wall (2, 2): in rationals, of those that float64
-    does not exclude."""
+    """The points (p, 2) on the line of a wall: in rationals, of those float64 does not exclude."""
     (px, py), (qx, qy) = wall
     one, other = (qx - px) * (points[:, 1] - py), (qy - py) * (points[:, 0] - px)
     possible = np.abs(one - other) <= NOT_EXCLUDED * (np.abs(one) + np.abs(other))
@@ -304,6 +287,5 @@ def points_in_line(wall: np.ndarray, points: np.ndarray) -> list[int]:
 
 
 def collinear(wall: np.ndarray, point: np.ndarray) -> bool:
-    """Whether a point (2,) lies on the line of a wall (2, 2), in rationals."""
     (px, py), (qx, qy), (x, y) = (rational(each) for each in (*wall, point))
     return (qx - px) * (y - py) == (qy - py) * (x - px)

@@ -14,6 +14,7 @@ from contextlib import suppress
 import numpy as np
 
 from crosscheck2d.scenarios.model import Scene, Thrust
+from crosscheck2d.scenarios.truth.oracle import resting
 from crosscheck2d.scenarios.truth.oracle.bodies import Bodies
 from crosscheck2d.scenarios.truth.oracle.contact_finder import ContactFinder
 from crosscheck2d.scenarios.truth.oracle.contacts import Pressed
@@ -24,23 +25,8 @@ from crosscheck2d.scenarios.truth.oracle.path import (
     Path,
     RecentCollisions,
     Record,
+    WorkLimit,
     ambiguous,
-)
-from crosscheck2d.scenarios.truth.oracle.resting import (
-    NO_GAP,
-    NO_MATTER,
-    NoLimit,
-    below,
-    gap_of,
-    in_step_after,
-    lasting,
-    lie_down,
-    limit_of_series,
-    nearly_in_line,
-    next_in_line,
-    press,
-    probe,
-    settle,
 )
 from crosscheck2d.scenarios.truth.oracle.ties import (
     ENDLESS,
@@ -51,7 +37,6 @@ from crosscheck2d.scenarios.truth.oracle.ties import (
     Velocities,
     key,
 )
-from crosscheck2d.scenarios.truth.oracle.work import WorkLimit
 
 MOST_IDLE = 100  # contacts in a row without a collision: the digits no longer decide
 
@@ -87,13 +72,14 @@ class Motion:
         }
 
     def run(self) -> Path:
-        """The motion up to `until`, or up to where it has no exact answer."""
         try:
             self.begin()
             while self.advance():
                 self.work.step(float(self.now), self.k.bits)
         except MotionEnds as end:
-            advice = [nearly_in_line(self.finder, i, float(self.now)) for i in end.disks[:1]]
+            advice = [
+                resting.nearly_in_line(self.finder, i, float(self.now)) for i in end.disks[:1]
+            ]
             self.path.end, self.path.reason = end.t, "".join([str(end), *advice])
             self.path.disks, self.path.outcomes = end.disks, end.outcomes
             self.path.few_bits = end.few_bits
@@ -106,15 +92,13 @@ class Motion:
         return self.path
 
     def begin(self) -> None:
-        """Begin the thrusts of t = 0, find the disks that rest, and predict all."""
         while self.starts_and_stops and self.starts_and_stops[-1][0] == 0:
             self.set_thrusts(self.starts_and_stops.pop()[1])
-        for contact in lie_down(self.finder):
+        for contact in resting.lie_down(self.finder):
             self.rest(contact)
         self.follow_up(set(np.flatnonzero(~self.scene.static).tolist()))
 
     def advance(self) -> bool:
-        """Carry out the next event; False if there is none before `until`."""
         soonest = self.due.min()
         if self.starts_and_stops and self.starts_and_stops[-1][0] <= soonest:
             t, disk = self.starts_and_stops.pop()
@@ -161,7 +145,6 @@ class Motion:
         return first, list(once.values())
 
     def record(self, i: int) -> Record:
-        """The record of a disk that is due."""
         record = self.records[i]
         assert record is not None
         return record
@@ -180,7 +163,6 @@ class Motion:
             raise
 
     def stale(self, record: Record) -> bool:
-        """Whether a partner has had an event since the record was made."""
         counts = self.bodies.count
         return any(
             c.kind == "body" and counts[c.j] != then
@@ -188,7 +170,6 @@ class Motion:
         )
 
     def predict(self, i: int) -> None:
-        """Find the next contact of disk i."""
         k = self.k
         if self.bodies.jet[i] is not None:
             return self.probe(Contact("probe", i, i))
@@ -220,7 +201,6 @@ class Motion:
             self.expect(i, self.now if at_once else self.now + after, contacts)
 
     def expect(self, i: int, t: Number, contacts: tuple[Contact, ...]) -> None:
-        """Set the record of disk i."""
         counts = self.bodies.count
         self.records[i] = Record(
             t, contacts, tuple(counts[c.j] if c.kind == "body" else 0 for c in contacts)
@@ -228,8 +208,7 @@ class Motion:
         self.due[i] = float(t) if float(t) <= self.until else np.inf
 
     def press(self, contact: Contact) -> None:
-        """Begin a lasting contact: from now on the disk rests on the wall."""
-        if not press(self.finder, contact, self.now):
+        if not resting.press(self.finder, contact, self.now):
             if self.join(contact):
                 return
             on = [self.bodies.name(held) for held in self.bodies.held[contact.i]]
@@ -241,9 +220,9 @@ class Motion:
         self.follow_up({contact.i})
 
     def join(self, contact: Contact) -> bool:
-        """Let the disks that forces keep in contact move as one from now on; False if none do."""
+        """Let the disks that forces keep in contact move as one; False if none do."""
         bodies, before = self.bodies, {key(c) for held in self.bodies.held for c in held}
-        groups = lasting(self.finder, contact, self.now)
+        groups = resting.lasting(self.finder, contact, self.now)
         for group in groups:
             for i in group.disks:
                 ours = [c for c in group.contacts if i in c.disks]
@@ -260,8 +239,8 @@ class Motion:
         return bool(groups)
 
     def ungroup(self, disks: set[int]) -> set[int]:
-        """Let the disks that move as one with these go on by themselves, each on the wall that it
-        is pressed onto; those disks."""
+        """Let these disks' groups go on one by one, each on the wall it is pressed onto; those
+        disks."""
         bodies, k = self.bodies, self.k
         members = disks.union(*(bodies.group[i] for i in disks))
         pairs = {key(c): c for i in members for c in bodies.held[i] if bodies.group[i]}
@@ -288,7 +267,6 @@ class Motion:
         return members
 
     def collide(self, contacts: list[Contact]) -> None:
-        """Resolve the contacts of one instant; if their order matters there is no exact answer."""
         self.refuse_corners(contacts)
         alone = len(contacts) == 1 and self.finder.alone(contacts[0], float(self.now))
         if alone:
@@ -297,8 +275,13 @@ class Motion:
             touches = self.finder.cluster(contacts, self.now)
         disks = sorted({i for touch in touches for i in touch.contact.disks})
         v = {i: self.bodies.velocity_at(i, self.now) for i in disks}
-        outcome = self.after_one(touches[0], v) if alone else self.after_all(touches, v)
-        self.log_all(outcome.collisions, contacts)
+        if alone:
+            after, collision = self.bodies.law.collide(touches[0], v)
+            still = frozenset(contacts if self.bodies.law.sticks else ())
+            outcome = TieOutcome(after, [collision], still)
+        else:
+            outcome = self.after_all(touches, v)
+        self.log(outcome.collisions, contacts)
         touched = {i for collision in outcome.collisions for i in collision.contact.disks} or set(
             disks
         )
@@ -325,14 +308,18 @@ class Motion:
         disks = {k for contact in contacts for k in contact.disks}
         v = {k: bodies.velocity_at(k, self.now) for k in disks}
         try:
-            limit = limit_of_series(self.finder, touches, v, self.until - now)
-        except NoLimit as fault:
+            limit = resting.limit_of_series(self.finder, touches, v, self.until - now)
+        except resting.NoLimit as fault:
             if i in recent.since:
-                end = recent.ends(i, now, self.other_side)
+                end = recent.ends(i, now, bodies.name)
                 end.few_bits = fault.few_bits
                 raise end from None
             return
-        if limit is None and len(touches) > 1 and gap_of(self.finder, touches, self.now) <= NO_GAP:
+        if (
+            limit is None
+            and len(touches) > 1
+            and resting.gap_of(self.finder, touches, self.now) <= resting.NO_GAP
+        ):
             limit = bodies.law.closed(touches, v, frozenset())
         if limit is None:
             return
@@ -346,19 +333,13 @@ class Motion:
             for event in self.path.events
             if float(event.t) <= since or not pairs & {(event.i, event.j), (event.j, event.i)}
         ]
-        self.log_all(limit.collisions, [])
+        self.log(limit.collisions, [])
         recent.close(contacts, now)
         first = contacts[0]
         rolls = len(contacts) == 1 and bodies.no_slip_on[first.i] == first
         self.go_on(limit, touches, disks, None, first if rolls else None)
 
-    def other_side(self, contact: Contact, i: int) -> str:
-        """The other side of a contact of disk i, in words."""
-        return self.bodies.name(contact) if contact.i == i else f"disk {contact.i}"
-
     def refuse_corners(self, contacts: Sequence[Contact]) -> None:
-        """Raise `MotionEnds` if a disk reaches an edge of the wrap or the end of its wall, or stops
-        sliding, at the instant at which it touches another."""
         comes = {
             "edge": "reaches the edge of the wrap",
             "end": "reaches the end of wall {}",
@@ -370,23 +351,16 @@ class Motion:
                 reason = f"disk {contact.i} {what} while it touches another"
                 raise MotionEnds(float(self.now), reason, [contact.i])
 
-    def after_one(self, touch: Touch, v: Velocities) -> TieOutcome:
-        """The outcome of a single contact."""
-        law = self.bodies.law
-        after, collision = law.collide(touch, v)
-        return TieOutcome(after, [collision], frozenset([touch.contact] if law.sticks else ()))
-
     def after_all(self, touches: Sequence[Touch], v: Velocities) -> TieOutcome:
-        """The outcome of contacts at one instant, if it is the same in every order."""
         bodies = self.bodies
-        resting = frozenset(contact for held in bodies.held for contact in held)
-        ends, tried = bodies.law.outcomes(touches, v, resting, bodies.stays_still)
+        held = frozenset(contact for contacts in bodies.held for contact in contacts)
+        ends, tried = bodies.law.outcomes(touches, v, held, bodies.stays_still)
         self.work.left -= tried
         if len(ends) == 1 and ends[0].velocities:
             return ends[0]
-        with suppress(NoLimit):
+        with suppress(resting.NoLimit):
             rest = self.until - float(self.now)
-            if limit := limit_of_series(self.finder, touches, v, rest, NO_MATTER):
+            if limit := resting.limit_of_series(self.finder, touches, v, rest, resting.NO_MATTER):
                 return limit
         disks = [i for i in v if i < self.scene.n]
         known = [end for end in ends if end.velocities]
@@ -394,12 +368,13 @@ class Motion:
         end.few_bits = ends[-1].unresolved == ENDLESS and not self.k.proves
         raise end
 
-    def log_all(self, collisions: Sequence[Collision], contacts: Sequence[Contact]) -> None:
-        """Log the collisions of one instant; the first one of each of `contacts` is new."""
+    def log(self, collisions: Sequence[Collision], contacts: Sequence[Contact]) -> None:
         arriving = {key(contact) for contact in contacts}
-        for collision in collisions:
-            self.log(collision, key(collision.contact) in arriving)
-            arriving.discard(key(collision.contact))
+        for contact, impulse, cosine, _ in collisions:
+            j, new = self.bodies.partner(contact), key(contact) in arriving
+            self.path.events.append(Event(self.now, contact.i, j, impulse, float(cosine), new))
+            self.accumulating += self.recent.add(float(self.now), contact)
+            arriving.discard(key(contact))
         self.idle = 0 if collisions else self.idle + 1
         if self.idle > MOST_IDLE:
             reason = f"numbers of {self.k.bits} bits have used up their digits"
@@ -424,7 +399,7 @@ class Motion:
         if outcome.searched:
             self.path.searched = min(self.path.searched, float(self.now))
         members, still_keys = self.ungroup(touched) - touched, {key(c) for c in outcome.still}
-        velocities, in_step = in_step_after(self.finder, outcome, touches)
+        velocities, in_step = resting.in_step_after(self.finder, outcome, touches)
         for i in sorted(touched):
             bodies.held[i] = tuple(c for c in bodies.held[i] if key(c) in still_keys)
             vx, vy, spin = velocities[i]
@@ -438,35 +413,25 @@ class Motion:
             bodies.no_slip_on[rolls_on.i] = rolls_on
         stop = None
         if bounce is not None and 0 < self.scene.restitution < 1:
-            stop = settle(self.finder, bounce, self.now, self.thrusts)
+            stop = resting.settle(self.finder, bounce, self.now, self.thrusts)
         self.follow_up(touched | members)
         if stop is not None and bounce is not None:
             self.expect(bounce.i, stop, (bounce._replace(kind="rest"),))
 
-    def log(self, collision: Collision, new: bool) -> None:
-        """Log a collision, and the disks whose collisions accumulate."""
-        contact, j = collision.contact, self.bodies.partner(collision.contact)
-        self.path.events.append(
-            Event(self.now, contact.i, j, collision.impulse, float(collision.cosine), new)
-        )
-        self.accumulating += self.recent.add(float(self.now), contact)
-
     def rest(self, contact: Contact) -> None:
-        """Log that a disk comes to rest: a contact that begins without an impulse."""
+        """Log a contact that begins without an impulse."""
         self.path.events.append(
             Event(self.now, contact.i, self.bodies.partner(contact), self.k.exact(0.0), 0.0)
         )
 
     def stop(self, contact: Contact) -> None:
-        """Let a disk rest on a wall on which its bounces have died out."""
         bodies, i = self.bodies, contact.i
-        wall = below(self.finder, contact._replace(kind="wall"), self.now)
+        wall = resting.below(self.finder, contact._replace(kind="wall"), self.now)
         bodies.hold(i, self.now, (*bodies.held[i], wall), bodies.velocity_at(i, self.now), True)
         self.rest(wall)
         self.follow_up({i})
 
     def roll(self, contact: Contact) -> None:
-        """End the slip of a disk on a wall with friction: it rolls, if friction is large enough."""
         bodies, i, side = self.bodies, contact.i, contact.side
         vx, vy, spin = bodies.velocity_at(i, self.now)
         # The spin without slip, to all digits.
@@ -475,15 +440,13 @@ class Motion:
         self.follow_up({i})
 
     def leave(self, contact: Contact) -> None:
-        """Move a disk off the end of the wall it rests on: onto the next wall in line, or into free
-        flight."""
         bodies, i, k = self.bodies, contact.i, self.k
         held = [c for c in bodies.held[i] if c.kind == "wall" and c.j == contact.j]
         v, end = (
             bodies.velocity_at(i, self.now),
             self.scene.walls[contact.j, 1 if contact.side > 0 else 0],
         )
-        following = next_in_line(self.finder, held[0], contact.side)
+        following = resting.next_in_line(self.finder, held[0], contact.side)
         if bodies.group[i]:
             reason = f"disk {i} reaches the end of wall {contact.j} while it touches another"
             raise MotionEnds(float(self.now), reason, [i])
@@ -509,8 +472,6 @@ class Motion:
         self.follow_up({i})
 
     def wrap(self, contact: Contact) -> None:
-        """Move a disk to the opposite edge of the wrap; if it overlaps another one there, there is
-        no exact answer."""
         i = contact.i
         if self.bodies.group[i]:
             reason = f"disk {i} crosses the edge of the wrap while it touches another"
@@ -526,18 +487,16 @@ class Motion:
 
     def probe(self, contact: Contact) -> None:
         """Find how long a disk under a thrust that turns with it certainly touches nothing."""
-        after = probe(self.finder, contact.i, self.now)
+        after = resting.probe(self.finder, contact.i, self.now)
         self.expect(contact.i, self.now + self.k.exact(after), (contact,))
 
     def set_thrusts(self, disk: int) -> set[int]:
-        """Begin or end a thrust; the disks whose motion that changes."""
         members = self.ungroup({disk})
         on = [p for p in self.thrusts if p.disk == disk and p.start <= float(self.now) < p.stop]
         self.bodies.set_thrusts(disk, self.now, on)
         return members
 
     def follow_up(self, disks: set[int]) -> None:
-        """Add the new legs of these disks to the path, and predict the disks again."""
         moving = sorted(i for i in disks if i < self.scene.n and not self.scene.static[i])
         for i in moving:
             self.path.legs[i].append(self.bodies.legs[i])
@@ -549,14 +508,11 @@ class Motion:
 
 
 def turns_with_disk(thrusts: Sequence[Thrust]) -> bool:
-    """Whether one of these thrusts turns with its disk."""
     return any(thrust.frame == "body" and thrust.force.any() for thrust in thrusts)
 
 
 def trace(
     scene: Scene, thrusts: Sequence[Thrust], until: float, k: Numbers, work: WorkLimit | None = None
 ) -> Path:
-    """The motion of `scene` under `thrusts` up to `until` s, within the limits of `work`. Raises as
-    `Bodies`."""
     with k.precise():
         return Motion(scene, thrusts, until, k, work or WorkLimit()).run()

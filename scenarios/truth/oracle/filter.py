@@ -30,7 +30,6 @@ Quartic = tuple[float, float, float, float, float]
 
 @kernel
 def moved(row: Array, now: float) -> Row:
-    """x, y, vx, vy, ax, ay of a leg at `now` s."""
     s = now - row[T]
     x = row[X] + (row[VX] + row[AX] * s / 2) * s
     y = row[Y] + (row[VY] + row[AY] * s / 2) * s
@@ -75,8 +74,6 @@ def soonest(
 
 @kernel
 def insert(bound: float, code: int, left: float, bounds: Array, codes: Codes, count: int) -> int:
-    """Insert `code` into the first `count` in order of time, unless its time is beyond `left`;
-    returns the new count."""
     if not bound <= left * (1 + SLACK) + BLUR:
         return count
     k = count
@@ -151,7 +148,6 @@ def first_fall(f: Quartic, end: float, blur: float) -> tuple[float, float]:
 
 @kernel
 def taylor(f: Quartic, t: float) -> Quartic:
-    """The coefficients of f around t."""
     q4 = f[4]
     q3 = f[3] + 4 * t * q4
     q2 = f[2] + t * (3 * f[3] + 6 * t * q4)
@@ -161,7 +157,6 @@ def taylor(f: Quartic, t: float) -> Quartic:
 
 @kernel
 def narrowed(f: Quartic, low: float, high: float, margin: float) -> tuple[float, float]:
-    """The bracket of a root, halved while the signs at both its ends are certain."""
     for _ in range(HALVINGS):
         middle = (low + high) / 2
         value = taylor(f, middle)[0]

@@ -32,61 +32,30 @@ class Undecided(ArithmeticError):
 
 @dataclass(frozen=True)
 class Numbers:
-    """One kind of numbers at one precision.
+    """One kind of numbers at one precision."""
 
-    Attributes:
-        name: the library's type.
-        bits: of each number.
-        exact: float64 -> the same number, unrounded.
-        sqrt: number -> its root.
-        sign: number -> -1, 0 or 1; 0 where it is below `tie`.
-        precise: makes the context in which all arithmetic is done.
-        between: two float64 -> a number between them; for balls, one that contains both.
-        spread: number -> the radius of a ball; 0 for other numbers.
-        tie: smaller numbers count as zero; in s, m and m/s, as scenes are of the order of 1.
-        proves: whether these are balls.
-    """
-
-    name: str
-    bits: int
-    exact: Callable[[float], Number]
+    name: str  # the library's type
+    bits: int  # of each number
+    exact: Callable[[float], Number]  # the same number, unrounded
     sqrt: Callable[[Number], Number]
-    sign: Callable[[Number], int]
-    precise: Callable[[], AbstractContextManager[Any]]
-    tie: Number
-    between: Callable[[float, float], Number]
-    spread: Callable[[Number], float]
-    proves: bool = False
+    sign: Callable[[Number], int]  # -1, 0 or 1; 0 below `tie`
+    precise: Callable[[], AbstractContextManager[Any]]  # in which all arithmetic is done
+    tie: Number  # smaller numbers count as zero; in s, m and m/s, as scenes are of the order of 1
+    between: Callable[[float, float], Number]  # for balls, one that contains both
+    spread: Callable[[Number], float]  # the radius of a ball; 0 for other numbers
+    proves: bool = False  # whether these are balls
 
 
 def mpfr(bits: int) -> Numbers:
     """MPFR's correctly rounded numbers. Raises ImportError where gmpy2 is missing."""
     import gmpy2
 
-    tie = gmpy2.mpfr(2) ** -(bits // 2)
-
-    def sign(x: Number) -> int:
-        return 1 if x > tie else -1 if x < -tie else 0
-
     def precise() -> AbstractContextManager[Any]:
         context: AbstractContextManager[Any] = gmpy2.context(gmpy2.get_context(), precision=bits)
         return context
 
-    def exact(x: float) -> Number:
-        # A float64 has 53 bits, fewer than any precision used here: nothing is rounded.
-        return gmpy2.mpfr(x, 53)
-
-    return Numbers(
-        "mpfr",
-        bits,
-        exact,
-        gmpy2.sqrt,
-        sign,
-        precise,
-        tie,
-        lambda a, b: exact((a + b) / 2),
-        _nothing,
-    )
+    # A float64 has 53 bits, fewer than any precision used here: nothing is rounded.
+    return _rounded("mpfr", bits, lambda x: gmpy2.mpfr(x, 53), gmpy2.sqrt, precise)
 
 
 def decimals(bits: int) -> Numbers:
@@ -94,30 +63,34 @@ def decimals(bits: int) -> Numbers:
     context = decimal.Context(
         prec=ceil(bits * log10(2)) + 1, Emin=decimal.MIN_EMIN, Emax=decimal.MAX_EMAX
     )
-    tie = decimal.Decimal(2) ** -(bits // 2)
+    return _rounded(
+        "decimal",
+        bits,
+        decimal.Decimal,
+        lambda x: x.sqrt(context),
+        lambda: decimal.localcontext(context),
+    )
+
+
+def _rounded(
+    name: str,
+    bits: int,
+    exact: Callable[[float], Number],
+    sqrt: Callable[[Number], Number],
+    precise: Callable[[], AbstractContextManager[Any]],
+) -> Numbers:
+    tie = exact(2.0) ** -(bits // 2)
 
     def sign(x: Number) -> int:
         return 1 if x > tie else -1 if x < -tie else 0
 
     def between(a: float, b: float) -> Number:
-        return decimal.Decimal((a + b) / 2)
+        return exact((a + b) / 2)
 
-    return Numbers(
-        "decimal",
-        bits,
-        decimal.Decimal,
-        lambda x: x.sqrt(context),
-        sign,
-        lambda: decimal.localcontext(context),
-        tie,
-        between,
-        _nothing,
-    )
+    return Numbers(name, bits, exact, sqrt, sign, precise, tie, between, lambda _x: 0.0)
 
 
 def balls(bits: int) -> Numbers:
-    """Arb's real balls, which are proven to contain the exact number. Raises ImportError where
-    python-flint is missing."""
     import flint
 
     nought = flint.arb(0)
@@ -139,28 +112,18 @@ def balls(bits: int) -> Numbers:
         finally:
             flint.ctx.prec = before
 
-    def between(a: float, b: float) -> Number:
-        return flint.arb(a).union(flint.arb(b))
-
-    def spread(x: Number) -> float:
-        return float(x.rad())
-
     return Numbers(
-        "arb",
-        bits,
-        flint.arb,
-        lambda x: x.sqrt(),
-        sign,
-        precise,
-        nought,
-        between,
-        spread,
+        name="arb",
+        bits=bits,
+        exact=flint.arb,
+        sqrt=lambda x: x.sqrt(),
+        sign=sign,
+        precise=precise,
+        tie=nought,
+        between=lambda a, b: flint.arb(a).union(flint.arb(b)),
+        spread=lambda x: float(x.rad()),
         proves=True,
     )
-
-
-def _nothing(_x: Number) -> float:
-    return 0.0
 
 
 def digits(bits: int) -> Numbers:
@@ -170,5 +133,4 @@ def digits(bits: int) -> Numbers:
 
 
 def has_balls() -> bool:
-    """Whether python-flint is installed."""
     return find_spec("flint") is not None

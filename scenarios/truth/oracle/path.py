@@ -1,10 +1,14 @@
-"""The motion that the event loop computes: legs, collisions, and why and when it ends."""
+"""The motion that the event loop computes: legs, collisions, and why and when it ends; and the
+limits on the work for it: a number of steps, the same on every machine, and a time limit where
+somebody waits for the answer."""
 
 from __future__ import annotations
 
 from collections import Counter, deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from math import inf
+from time import monotonic
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +23,8 @@ INSTANT = 1e-9  # ... within this many s accumulate; in a fast scene ...
 SHARE = 1e-7  # ... within this share of the time in which a disk moves by its radius
 SUSPECT, OFTEN = 16, 4  # collisions of a disk, and of one contact of it, that may accumulate
 NAMED = 1e-5  # s before that; the bodies it collides with in this time are named in the reason
+# collisions, edges crossed, records made anew, orders of simultaneous collisions tried
+MOST_STEPS = 60_000
 
 
 class MotionEnds(Exception):
@@ -60,43 +66,25 @@ class Record(NamedTuple):
 
 @dataclass
 class Path:
-    """A computed motion.
+    """A computed motion."""
 
-    Attributes:
-        legs: of each disk, in order of time.
-        events: the collisions.
-        end, reason: s, up to when there is an exact answer, and why it ends there.
-        disks: those that the reason concerns.
-        outcomes: the possible outcomes at the end, if they are known.
-        named: the collisions of each outcome: disk, other disk or -1 - wall.
-        few_bits: whether it ends because its numbers have too few bits.
-        searched: s, from when on it rests on a search, see `TieOutcome`.
-    """
-
-    legs: list[list[Leg]]
+    legs: list[list[Leg]]  # of each disk, in order of time
     events: list[Event] = field(default_factory=list)
-    end: float = np.inf
-    reason: str = ""
-    disks: list[int] = field(default_factory=list)
-    outcomes: list[TieOutcome] = field(default_factory=list)
+    end: float = np.inf  # s, up to when there is an exact answer
+    reason: str = ""  # why it ends there
+    disks: list[int] = field(default_factory=list)  # those that the reason concerns
+    outcomes: list[TieOutcome] = field(default_factory=list)  # at the end, if they are known
+    # the collisions of each outcome: disk, other disk or -1 - wall
     named: list[list[tuple[int, int]]] = field(default_factory=list)
-    few_bits: bool = False
-    searched: float = np.inf
+    few_bits: bool = False  # whether it ends because its numbers have too few bits
+    searched: float = np.inf  # s, from when on it rests on a search, see `TieOutcome`
 
     def cut(self, end: float, reason: str) -> Path:
-        """The motion up to an earlier end, for another reason."""
         return Path(self.legs, self.events, end, reason, searched=self.searched)
 
 
 class RecentCollisions:
-    """The latest collisions of each disk of a scene.
-
-    Attributes:
-        instant: s; so many collisions within it accumulate. At e = 1 it is 0: there are finitely
-            many collisions in a finite time (Vaserstein, Commun. Math. Phys. 69, 31, 1979).
-        since: disk -> s, when its collisions began to accumulate.
-        closed: the latest contacts of each disk whose collisions have died out.
-    """
+    """The latest collisions of each disk of a scene."""
 
     def __init__(self, scene: Scene) -> None:
         self.collisions: list[deque[tuple[float, Contact]]] = [
@@ -107,10 +95,13 @@ class RecentCollisions:
             float(np.hypot(*scene.velocity.T).max()),
             float(np.sqrt(np.hypot(*scene.gravity) * radius)),
         )
+        # s; so many collisions within it accumulate. At e = 1 it is 0: there are finitely many
+        # collisions in a finite time (Vaserstein, Commun. Math. Phys. 69, 31, 1979).
         self.instant = min(INSTANT, SHARE * radius / fastest) if fastest else INSTANT
         if scene.restitution == 1:
             self.instant = 0.0
-        self.since: dict[int, float] = {}
+        self.since: dict[int, float] = {}  # s, when the collisions of a disk began to accumulate
+        # the latest contacts of each disk whose collisions have died out
         self.closed: list[deque[tuple[float, Contact]]] = [deque(maxlen=OFTEN) for _ in scene.mass]
 
     def add(self, t: float, contact: Contact) -> list[int]:
@@ -123,12 +114,10 @@ class RecentCollisions:
         return [i for i in disks if self.within(i, SUSPECT, t)]
 
     def within(self, i: int, count: int, t: float) -> bool:
-        """Whether the latest `count` collisions of disk i, up to t s, lie within an instant."""
         collisions = self.collisions[i]
         return len(collisions) >= count and t - collisions[-count][0] <= self.instant
 
     def close(self, contacts: Sequence[Contact], t: float) -> None:
-        """Forget the collisions of these contacts: they have closed, at t s."""
         closed = {key(contact) for contact in contacts}
         for i in {i for c in contacts for i in c.disks if i < len(self.collisions)}:
             collisions = self.collisions[i]
@@ -155,20 +144,15 @@ class RecentCollisions:
                     waiting += sorted(more - {*waiting})
         return list(contacts.values())
 
-    def ends(self, i: int, t: float, name: Callable[[Contact, int], str]) -> MotionEnds:
-        """Why the motion ends where the collisions of disk i accumulate, up to t s.
-
-        name: the other side of a contact of disk i, in words.
-        """
+    def ends(self, i: int, t: float, name: Callable[[Contact], str]) -> MotionEnds:
         latest = [contact for at, contact in self.collisions[i] if at > t - NAMED]
-        others = sorted({name(contact, i) for contact in latest})
+        others = sorted({name(c) if c.i == i else f"disk {c.i}" for c in latest})
         disks = [i, *(int(other[5:]) for other in others if other.startswith("disk"))]
         reason = f"the collisions of disk {i} on {' and '.join(others)} accumulate"
         return MotionEnds(self.since[i], reason, disks)
 
 
 def ambiguous(disks: Sequence[int], ends: Sequence[TieOutcome]) -> str:
-    """The reason why simultaneous contacts of these disks have no exact answer."""
     what, their = f"disks {', '.join(map(str, disks))} touch at once", "their"
     if len(disks) == 1:
         what, their = f"disk {disks[0]} touches several walls at once", "its"
@@ -182,3 +166,32 @@ def ambiguous(disks: Sequence[int], ends: Sequence[TieOutcome]) -> str:
     return (
         f"{what} and the outcome depends on the order of {their} collisions ({len(ends)} outcomes)"
     )
+
+
+class TimeLimit:
+    """A time limit for all attempts at an answer, from the creation of the object on. An answer
+    that it cuts short, for this reason, depends on the machine, and is never cached."""
+
+    def __init__(self, seconds: float = inf, reason: str = "") -> None:
+        self.end, self.reason = monotonic() + seconds, reason
+        self.expired = False  # whether an attempt was cut short
+
+
+class WorkLimit:
+    """The limits of one attempt: `left` steps, and a share of the time that its clock has left."""
+
+    def __init__(
+        self, left: int = MOST_STEPS, clock: TimeLimit | None = None, share: float = 1.0
+    ) -> None:
+        self.left, self.clock, now = left, clock or TimeLimit(), monotonic()
+        self.stop = now + share * (self.clock.end - now)
+
+    def step(self, t: float, bits: int) -> None:
+        """Count a step that led to `t` s in numbers of `bits` bits; raises `MotionEnds` if none is
+        left."""
+        self.left -= 1
+        if self.left < 0:
+            raise MotionEnds(t, f"the work allowed for an answer in {bits} bits is used up")
+        if monotonic() > self.stop:
+            self.clock.expired = True
+            raise MotionEnds(t, self.clock.reason)

@@ -108,8 +108,6 @@ def slip_stays(finder: ContactFinder, contact: Contact, thrusts: Sequence[Thrust
 
 
 def along(bodies: Bodies, contact: Contact, x: Number, y: Number) -> tuple[Number, Number]:
-    """The part of a vector (x, y) along the wall of a contact; 0 if the disk also rests on another
-    wall."""
     if bodies.held[contact.i]:
         return bodies.k.exact(0.0), bodies.k.exact(0.0)
     return bodies.slide(contact, x, y)
@@ -130,8 +128,7 @@ def untouched(
     own = (np.hypot(vx, vy) + np.hypot(ax, ay) * left / 2) * left + hop_height(leg)
     states = np.array([moved(row, float(leg.t)) for row in table])
     heights = np.array([hop_height(each) for each in bodies.legs])
-    energy = spin_energy(bodies, leg.t)
-    others = travel(bodies, states, left, thrusts, energy)
+    others = travel(bodies, states, leg.t, left, thrusts)
     distance = np.hypot(states[:, 0] - x, states[:, 1] - y) - bodies.radii - bodies.radii[i]
     slack = FAR * (np.abs(states[:, :2]).max() + 1)
     needed = (own + others) * SAFE
@@ -193,7 +190,7 @@ def room(finder: ContactFinder, contact: Contact, leg: Leg) -> float:
 
 
 def apart(bodies: Bodies, i: int, j: int, now: Number) -> float:
-    """The gap, m, between two bodies, to all digits of float64 even where it is tiny."""
+    """m between two bodies, to all digits of float64 even where it is tiny."""
     (x, y, _, _), (px, py, _, _) = bodies.state_at(i, now), bodies.state_at(j, now)
     dx, dy, reach = px - x, py - y, bodies.reach(Contact("body", i, j))
     gap = dx * dx + dy * dy - reach * reach
@@ -203,32 +200,25 @@ def apart(bodies: Bodies, i: int, j: int, now: Number) -> float:
 
 
 def travel(
-    bodies: Bodies, states: Array, left: float, thrusts: Sequence[Thrust], spins: float
+    bodies: Bodies, states: Array, now: Number, left: float, thrusts: Sequence[Thrust]
 ) -> Array:
     """(b,) m, the largest distance that each body can move within `left` s, from states (b, 6) as
-    of `moved`; see `untouched`. spins: J, rotational energy that friction may turn into motion."""
+    of `moved`; see `untouched`. Friction may turn the energy of rotation into motion."""
     mass = np.append(bodies.scene.mass, np.full(len(states) - bodies.scene.n, np.inf))
     moves = np.isfinite(mass)
     accelerations = [float(np.hypot(*thrust.force)) / mass[thrust.disk] for thrust in thrusts]
     acceleration = float(np.hypot(*bodies.scene.gravity)) + sum(accelerations)
     hops = np.array([0.0 if leg.hop is None else float(leg.hop.speed) ** 2 for leg in bodies.legs])
     energy = (mass[moves] * ((states[moves, 2:4] ** 2).sum(axis=1) + hops[moves])).sum() / 2
-    energy += spins
+    turns = np.isfinite(bodies.scene.inertia) & ~bodies.scene.static
+    spins = np.array([float(bodies.turn_at(i, now).spin) for i in range(bodies.scene.n)])
+    energy += float((bodies.scene.inertia[turns] * spins[turns] ** 2).sum() / 2)
     speed = np.sqrt(energy) + np.sqrt(mass[moves].sum() / 2) * acceleration * left
     rise: Array = np.sqrt(2 / mass) * speed * left
     return rise
 
 
-def spin_energy(bodies: Bodies, now: Number) -> float:
-    """J, the rotational energy of all disks, where there is friction; else 0."""
-    scene = bodies.scene
-    turns = np.isfinite(scene.inertia) & ~scene.static
-    spins = np.array([float(bodies.turn_at(i, now).spin) for i in range(scene.n)])
-    return float((scene.inertia[turns] * spins[turns] ** 2).sum() / 2)
-
-
 def hop_height(leg: Leg) -> float:
-    """m, how high the bounces on a leg reach."""
     return 0.0 if leg.hop is None else float(leg.hop.speed) ** 2 / 2 / float(leg.hop.fall)
 
 
@@ -351,7 +341,6 @@ def limit_of_series(
 
 
 def gap_of(finder: ContactFinder, touches: Sequence[Touch], now: Number) -> float:
-    """The largest gap of these contacts over the radius of its disk."""
     bodies, gaps = finder.bodies, list[float]()
     for contact, dx, dy in touches:
         x, y, _, _ = bodies.state_at(contact.i, now)
@@ -362,7 +351,6 @@ def gap_of(finder: ContactFinder, touches: Sequence[Touch], now: Number) -> floa
 
 
 def closed(finder: ContactFinder, touch: Touch, now: Number) -> bool:
-    """Whether a contact that touches has no speed along its normal."""
     bodies, contact = finder.bodies, touch.contact
     if in_step(finder, contact) or key(contact) in map(key, bodies.held[contact.i]):
         return True
@@ -381,14 +369,12 @@ def turning(finder: ContactFinder, touch: Touch, v: Velocities) -> Number:
 
 
 def in_step(finder: ContactFinder, contact: Contact) -> bool:
-    """Whether two bodies are known to have the same velocity: since they met, or as one group."""
     bodies, (i, j) = finder.bodies, sorted((contact.i, contact.j))
     counts = bodies.count[i], bodies.count[j]
     return contact.kind == "body" and (j in bodies.group[i] or bodies.in_step.get((i, j)) == counts)
 
 
 def slides(k: Numbers, touch: Touch, v: Velocities) -> bool:
-    """Whether one of two disks moves, or is accelerated, along the other."""
     (ux, uy, _), (px, py, _) = v[touch.contact.i], v[touch.contact.j]
     return k.sign(touch.dx * (py - uy) - touch.dy * (px - ux)) != 0
 
@@ -417,7 +403,6 @@ def in_step_after(
 
 
 def may_slide(k: Numbers, touch: Touch, v: Velocities) -> bool:
-    """Whether two disks move along each other, or it is not decided that they do not."""
     try:
         return slides(k, touch, v)
     except Undecided:
@@ -425,7 +410,6 @@ def may_slide(k: Numbers, touch: Touch, v: Velocities) -> bool:
 
 
 def upper_and_lower(finder: ContactFinder, touch: Touch) -> tuple[str, list[int]]:
-    """Which disk rolls over what, in words, and the disks."""
     contact, (gx, gy) = touch.contact, finder.scene.gravity.tolist()
     upper, lower = f"disk {contact.i}", finder.bodies.name(contact)
     disks = [i for i in (contact.i, contact.j) if i < finder.scene.n]
@@ -435,7 +419,6 @@ def upper_and_lower(finder: ContactFinder, touch: Touch) -> tuple[str, list[int]
 
 
 def joined(scene: Scene, contacts: Sequence[Contact]) -> list[list[int]]:
-    """The groups of moving disks that these contacts connect, static ones aside."""
     groups: list[set[int]] = []
     for contact in contacts:
         members = {i for i in contact.disks if i < scene.n and not scene.static[i]}
@@ -475,26 +458,26 @@ def move_as_one(
 
 
 def parallel(one: Array, other: Array) -> bool:
-    """Whether two walls (2, 2) have the same direction, in rationals."""
     (px, py), (qx, qy) = rational(other[0]), rational(other[1])
     (ax, ay), (bx, by) = rational(one[0]), rational(one[1])
     return (qx - px) * (by - ay) == (qy - py) * (bx - ax)
 
 
 def lie_down(finder: ContactFinder) -> list[Contact]:
-    """Let disks that touch a wall rest on it from the start; the contacts."""
     bodies, now = finder.bodies, finder.bodies.nought
     lying = [
         c
         for c, approach in start(finder)
-        if c.kind == "wall" and approach == 0 and _pressed(bodies, c)
+        if c.kind == "wall"
+        and approach == 0
+        and bodies.k.sign(bodies.outward(c, *bodies.free[c.i][1:])) < 0  # pressed onto it
     ]
     return [c for c in lying if press(finder, c, now)]
 
 
 def next_in_line(finder: ContactFinder, contact: Contact, side: int) -> Contact | None:
-    """The contact with the wall that carries a disk on in line, farthest beyond the end (side 1) or
-    the start (-1) of this one; None if there is none."""
+    """With the wall that carries a disk on in line, farthest beyond the end (side 1) or start
+    (-1)."""
     walls, w = finder.scene.walls, contact.j
     heading = walls[w] if side > 0 else walls[w, ::-1]
     tip = line_span(heading, heading)[1]
@@ -518,7 +501,6 @@ def below(finder: ContactFinder, contact: Contact, now: Number) -> Contact:
 
 
 def _moved_to(finder: ContactFinder, contact: Contact, k: int) -> Contact:
-    """The contact on the same side of wall k, which lies in line."""
     walls, w = finder.scene.walls, contact.j
     same = (walls[k, 1] - walls[k, 0]) @ (walls[w, 1] - walls[w, 0]) > 0
     return contact._replace(j=k, side=contact.side if same else -contact.side)
@@ -540,12 +522,6 @@ def nearly_in_line(finder: ContactFinder, i: int, now: float) -> str:
             a, b = sorted((a, b))
             return f"; walls {a} and {b} are in line but for rounding: write them as one wall"
     return ""
-
-
-def _pressed(bodies: Bodies, contact: Contact) -> bool:
-    """Whether the acceleration of free flight presses the disk of a contact onto the wall."""
-    _, ax, ay = bodies.free[contact.i]
-    return bodies.k.sign(bodies.outward(contact, ax, ay)) < 0
 
 
 def start(finder: ContactFinder) -> list[tuple[Contact, Fraction]]:
@@ -588,7 +564,6 @@ def start(finder: ContactFinder) -> list[tuple[Contact, Fraction]]:
 
 
 def last_place(bodies: Bodies, contact: Contact) -> float:
-    """m, one unit in the last place of the largest coordinate or radius of a contact."""
     wall = contact.kind == "wall"
     rows = [contact.i] if wall else [contact.i, contact.j]
     coordinates = [bodies.table[rows, :2].ravel(), bodies.radii[rows]]

@@ -1,5 +1,21 @@
 """Collisions: of one contact, and of several contacts at one instant, resolved in every possible
-order."""
+order; with Coulomb friction.
+
+There is one coefficient mu, and no rolling resistance. In a collision the impulse of friction
+opposes the slip s, the relative speed of the contact points along the tangent:
+
+    J_t = min(mu J_n, |s| / (1/m_a + 1/m_b + r_a^2/I_a + r_b^2/I_b)),
+
+where J_n = (1 + e) m_n v_n is the impulse along the normal (Foerster, Louge, Chang & Allia, Phys.
+Fluids 6, 1108, 1994, with no tangential restitution). For disks this is the integral of Coulomb's
+law over the collision: the normal passes through the centre, so J_n gives no torque and changes no
+slip, and J_t changes no speed along the normal. The slip decreases in proportion to J_t, whatever
+the course of the normal force, and once it is 0 it stays 0 (Stronge, Impact Mechanics, 2000, ch. 3
+and 4).
+
+On a wall the same law gives a force: mu N against the slip; without slip the force that keeps it 0,
+if that is at most mu N (any textbook of mechanics, under "rolling").
+"""
 
 from __future__ import annotations
 
@@ -12,7 +28,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from crosscheck2d.scenarios.truth.oracle.clusters import collapse, complementary, is_m_matrix
-from crosscheck2d.scenarios.truth.oracle.friction import Friction, limited
 from crosscheck2d.scenarios.truth.oracle.numbers import Number, Numbers, Undecided
 
 MOST_ORDERS = 3000  # collisions tried in all orders together
@@ -87,6 +102,28 @@ class TieOutcome(NamedTuple):
     searched: bool = False
 
 
+class Friction(NamedTuple):
+    """The data for friction: mu, and the radius, m, and 1 / inertia, 1/(kg m2), of each body."""
+
+    coefficient: Number
+    radius: Sequence[Number]
+    inverse_inertia: Sequence[Number]
+
+    def rim_inverse_mass(self, i: int) -> Number:
+        """1/kg, the speed that 1 N s along its rim gives the rim of body i by rotation."""
+        return self.radius[i] * self.radius[i] * self.inverse_inertia[i]
+
+
+def limited(k: Numbers, wanted: Number, most: Number) -> tuple[Number, bool]:
+    """`wanted`, the friction that keeps the slip 0, limited to `most` either way; and whether it
+    was within the limit."""
+    if k.sign(most - wanted) < 0:
+        return most, False
+    if k.sign(most + wanted) < 0:
+        return -most, False
+    return wanted, True
+
+
 @dataclass(frozen=True)
 class CollisionLaw:
     """The law of collisions for a set of bodies: 1 / mass (b,) 1/kg; the restitution; whether that
@@ -145,8 +182,7 @@ class CollisionLaw:
         collision: Collision,
         friction: Friction,
     ) -> tuple[Velocities, Collision]:
-        """`after` and `collision` of a collision from velocities v, with friction added; see
-        `friction.py`."""
+        """`after` and `collision` of a collision from velocities v, with friction added."""
         contact, i, body = touch.contact, touch.contact.i, touch.contact.kind == "body"
         (ux, uy, spin), (px, py, turn) = self._pair(touch, v)
         distance = self.numbers.sqrt(touch.dx * touch.dx + touch.dy * touch.dy)
@@ -161,18 +197,12 @@ class CollisionLaw:
         kick, slip_ended = limited(
             self.numbers, -slip / inverse_effective_mass, friction.coefficient * collision.impulse
         )
-        after = {**after, i: self._kicked(after[i], i, -kick * tx, -kick * ty, kick)}
-        if body:
-            j = contact.j
-            after[j] = self._kicked(after[j], j, kick * tx, kick * ty, kick)
+        after, sides = dict(after), [(i, -kick * tx, -kick * ty), (contact.j, kick * tx, kick * ty)]
+        for k, jx, jy in sides[: len(contact.disks)]:
+            w, turns = self.inverse_mass[k], friction.radius[k] * friction.inverse_inertia[k]
+            vx, vy, spin = after[k]
+            after[k] = vx + w * jx, vy + w * jy, spin - turns * kick
         return after, collision._replace(slip_ended=slip_ended)
-
-    def _kicked(self, v: Velocity, i: int, jx: Number, jy: Number, kick: Number) -> Velocity:
-        """A velocity after the impulse (jx, jy) N s on the rim of body i, whose angular impulse is
-        r `kick`, clockwise."""
-        assert self.friction is not None
-        w, turns = self.inverse_mass[i], self.friction.radius[i] * self.friction.inverse_inertia[i]
-        return v[0] + w * jx, v[1] + w * jy, v[2] - turns * kick
 
     def outcomes(
         self,
@@ -282,19 +312,17 @@ class CollisionLaw:
             return None
         q = [k.exact(0.0) if t.contact in still else self.approach(t, v) for t in touches]
         impulses = complementary(k, matrix, q)
-        if impulses is None or (not self.sticks and not self.collapses(matrix, impulses, e)):
+        if impulses is None:
             return None
+        if not self.sticks:
+            # The contacts without impulse are never touched, as no impulse is larger than these.
+            active = list(impulses)
+            part = np.array([[float(matrix[a][b]) for b in active] for a in active])
+            most = np.array([float(impulses[a]) for a in active])
+            if len(active) < 2 or not collapse(part, most, e):
+                return None
         end = self.close(touches, v, still, impulses)
         return end and end._replace(searched=not self.sticks)
-
-    def collapses(
-        self, matrix: Sequence[Sequence[Number]], impulses: Mapping[int, Number], e: float
-    ) -> bool:
-        """Whether every order of collisions closes the contacts with these impulses; the others are
-        then never touched, as no impulse is larger than these."""
-        active = list(impulses)
-        part = np.array([[float(matrix[a][b]) for b in active] for a in active])
-        return len(active) > 1 and collapse(part, np.array([float(impulses[a]) for a in active]), e)
 
     def close(
         self,
@@ -347,15 +375,16 @@ class CollisionLaw:
 
 def delassus(law: CollisionLaw, touches: Sequence[Touch]) -> list[list[Number]]:
     """(K, K) the change of dr.dv of each contact by 1 impulse, times dr, at each."""
-    return [[_coupling(law, one, other) for other in touches] for one in touches]
-
-
-def _coupling(law: CollisionLaw, one: Touch, other: Touch) -> Number:
-    a, b, total = one.contact, other.contact, law.numbers.exact(0.0)
-    for body in a.disks & b.disks:
-        product = law.inverse_mass[body] * (one.dx * other.dx + one.dy * other.dy)
-        total = total + product if (body == a.i) == (body == b.i) else total - product
-    return total
+    rows: list[list[Number]] = []
+    for row in touches:
+        rows.append([])
+        for touch in touches:
+            a, b, total = row.contact, touch.contact, law.numbers.exact(0.0)
+            for body in a.disks & b.disks:
+                product = law.inverse_mass[body] * (row.dx * touch.dx + row.dy * touch.dy)
+                total = total + product if (body == a.i) == (body == b.i) else total - product
+            rows[-1].append(total)
+    return rows
 
 
 def apply(

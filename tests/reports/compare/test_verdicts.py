@@ -251,6 +251,36 @@ def test_a_ball_that_rests_too_early_fails():
     assert "time_of_rest" in failed(one, rest, truth)
 
 
+@pytest.mark.parametrize("every", [8, 16, 32])
+@pytest.mark.parametrize("name", ["falling_box", "gas_of_100"])
+def test_disks_that_others_drove_past_each_other_between_two_samples_did_not_tunnel(
+    name: str, every: int
+):
+    one, engine = scenario(name), "event_driven:float64"
+    played = play(ENGINES[engine].make(), engine, one, one.dt(one.substeps[-1])).trajectory
+    assert played is not None
+    samples = ("t", "position", "velocity", "angle", "angular_velocity")
+    rare = replace(played, **{field: getattr(played, field)[::every] for field in samples})
+    one = replace(one, sample_interval=every * one.sample_interval, duration=float(rare.t[-1]))
+
+    assert "tunnelled" not in failed(one, rare)
+
+
+def test_a_disk_that_flies_through_one_at_rest_beside_a_wall_tunnelled():
+    # 0.3 R beside its centre and 3 R a sample: a third disk could have driven it round
+    one, _ = truth_of("head_on_equal_e1")
+    radius = one.scene.radius[0]
+    x = radius * np.array([[-7.5, 0.3], [0.0, 0.0]])
+    velocity = radius * np.array([[30.0, 0.0], [0.0, 0.0]])
+    walls = radius * np.array([[[-9.0, -1.1], [9.0, -1.1]]])
+    scene = replace(one.scene, position=x, velocity=velocity, walls=walls)
+    one = replace(one, scene=scene, duration=0.4, sample_interval=0.1)
+    t, still = np.arange(5) * 0.1, np.zeros((5, 2))
+    through = Trajectory(t, x + t[:, None, None] * velocity, np.array([velocity] * 5), still, still)
+
+    assert failed(one, through)["tunnelled"].disks == (0, 1)
+
+
 def test_two_disks_that_change_sides_tunnelled():
     one, truth = truth_of("head_on_equal_e1")
     t = truth.t[:, None, None]
