@@ -18,7 +18,7 @@ import numpy as np
 import pandas as pd
 
 from crosscheck2d.adapters.engines import ENGINES, row_of
-from crosscheck2d.adapters.run import Run, unplayed_run
+from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.check.verdict import check_file
 from crosscheck2d.reports.compare.against import TRUTH
 from crosscheck2d.reports.compare.comparison import Comparison, compare
@@ -198,7 +198,7 @@ def raising() -> Iterator[None]:
 def as_run(ended: Run | Failure, name: str, substeps: int, scenario: Scenario) -> Run:
     if isinstance(ended, Run):
         return ended
-    lost = unplayed_run(name, scenario, scenario.dt(substeps))
+    lost = Run.unplayed(name, scenario, scenario.dt(substeps))
     return replace(lost, status=ended.status, reason=ended.reason)
 
 

@@ -44,7 +44,7 @@ LAYERS = {
     "adapters": [
         "matched safe_path system",
         "engine",
-        "advance engine_row first_collisions float32 friction library_versions run runaway",
+        "advance engine_row float32 friction library_versions run",
         "play",
         f"{' '.join({name.partition(':')[0] for name in ENGINES})} library_at_version",
         "npm_packages",

@@ -14,9 +14,9 @@ from typing import NamedTuple, NoReturn
 import numpy as np
 import psutil
 
+from crosscheck2d.adapters.advance import off_grid_note
 from crosscheck2d.adapters.engines import OWN, row_of
 from crosscheck2d.adapters.run import STATUSES
-from crosscheck2d.adapters.thrust_grid import off_grid_note
 from crosscheck2d.reports.commands.own_solvers import checks_of, lines
 from crosscheck2d.reports.compare.fast_disks import fast_note
 from crosscheck2d.reports.page.report import PAGE, Report, make_report, take_times

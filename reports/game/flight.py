@@ -15,9 +15,8 @@ import numpy as np
 from crosscheck2d.adapters.advance import advance
 from crosscheck2d.adapters.engine import Engine
 from crosscheck2d.adapters.engines import ENGINES
-from crosscheck2d.adapters.first_collisions import weight_impulse
 from crosscheck2d.adapters.host.engine import GuestEngine
-from crosscheck2d.adapters.runaway import RUNAWAY, fault_of, reach
+from crosscheck2d.adapters.run import fault_of, reach, weight_impulse
 from crosscheck2d.reports.compare.laws import nearer_way
 from crosscheck2d.reports.game.divergence import (
     NEVER,
@@ -187,7 +186,7 @@ class Flight:
         self.dt = scenario.dt(self.substeps)
         scene = scenario.scene
         self.is_game = scene.wrap is not None and np.array_equal(scene.wrap, [LOW, HIGH])
-        self.farthest = RUNAWAY * reach(scenario)
+        self.farthest = reach(scenario)
         self.pilot = Pilot(scene, scenario.sample_interval)
         self.steered = scenario  # with the thrusts of the keys that are down
         self.frame, self.left_at = 0, -1

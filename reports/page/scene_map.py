@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 from markupsafe import Markup
 
+from crosscheck2d.adapters.advance import off_grid_note
 from crosscheck2d.adapters.engines import OWN
-from crosscheck2d.adapters.thrust_grid import off_grid_note
 from crosscheck2d.reports.compare.fast_disks import fast_note
 from crosscheck2d.reports.compare.metrics import METRICS
 from crosscheck2d.reports.compare.verdicts import VERDICTS

@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from crosscheck2d.adapters.engine import Unsupported
-from crosscheck2d.adapters.run import Run, gather
-from crosscheck2d.adapters.runaway import fault_of
+from crosscheck2d.adapters.run import Run, fault_of, gather
 from crosscheck2d.reports.stability.limits import Case, DrivenEngine, with_variant
 from crosscheck2d.reports.stability.predicates import (
     ANGLE_OFF,

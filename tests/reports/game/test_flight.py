@@ -18,9 +18,9 @@ from crosscheck2d.adapters.conformance.probe import loaded
 from crosscheck2d.adapters.engine import ContactImpulse, Unsupported
 from crosscheck2d.adapters.engine_row import EngineRow
 from crosscheck2d.adapters.engines import ENGINES
-from crosscheck2d.adapters.first_collisions import first_collisions
 from crosscheck2d.adapters.host.engine import OwnSolver
 from crosscheck2d.adapters.play import play
+from crosscheck2d.adapters.run import first_collisions
 from crosscheck2d.reports.game.divergence import (
     NEVER,
     WAIT,
