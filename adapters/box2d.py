@@ -11,7 +11,7 @@ import numpy as np
 
 from crosscheck2d.adapters.advance import onto_torus
 from crosscheck2d.adapters.engine import KEPT, PASSED, ContactImpulse
-from crosscheck2d.adapters.float32 import must_fit, must_not_be_cut, rounding
+from crosscheck2d.adapters.float32 import must_fit, must_not_be_cut, rounding, vector
 from crosscheck2d.adapters.friction import of_shapes
 from crosscheck2d.adapters.library_versions import BOX2D, version
 from crosscheck2d.adapters.matched import GEOMETRY, Searched
@@ -131,7 +131,6 @@ class Box2DEngine:
         self.asked_friction = friction
 
     def load(self, scene: Scene, dt: float) -> None:
-        """Build a new world in the profile's units."""
         self.scene, self.dt, self.steps = scene, dt, 0
         self.friction = of_shapes(scene, self.matched, self.asked_friction)
         chosen = self.chosen
@@ -198,13 +197,11 @@ class Box2DEngine:
         return body
 
     def apply_force(self, disk: int, force: Array, torque: float) -> None:
-        """Apply force and torque; `Step` clears both."""
         per_time2 = self.time**2
         self.bodies[disk].ApplyForceToCenter(vector(force * self.length * per_time2), True)
         self.bodies[disk].ApplyTorque(float(torque * self.length**2 * per_time2), True)
 
     def step(self, count: int = 1) -> None:
-        """`count` calls of `Step`; Box2D has no torus: disks that leave are shifted."""
         dt = self.dt / self.time
         for _ in range(count):
             self.world.Step(dt, self.velocity_iterations, self.position_iterations)
@@ -223,7 +220,7 @@ class Box2DEngine:
                 body.transform = ((onto_torus(x, x0, x1), onto_torus(y, y0, y1)), body.angle)
 
     def read(self) -> State:
-        """Attribute by attribute: box2d-py has no bulk read."""
+        # Attribute by attribute: box2d-py has no bulk read.
         n, bodies = self.scene.n, self.bodies
         position = np.array([tuple(b.position) for b in bodies], float).reshape(n, 2) / self.length
         velocity = (
@@ -241,14 +238,12 @@ class Box2DEngine:
         return State(position, velocity, angle, angular_velocity)
 
     def collisions(self) -> list[ContactImpulse]:
-        """From `PostSolve`, with impulses converted to N s."""
         return [
             ContactImpulse(step, i, j, impulse / self.speed)
             for step, i, j, impulse in self.listener.log
         ]
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
-        """Resolved values are read back from the world, a fixture and the engine's constants."""
         matched, world, chosen = self.matched, self.world, self.chosen
         fixture = self.bodies[0].fixtures[0]
         iterations = f"{self.velocity_iterations}, {self.position_iterations}"
@@ -259,7 +254,10 @@ class Box2DEngine:
             "linear slop in m": (None, Box2D.b2_linearSlop / self.length),
             "speed cap in m/s": (None, self.speed_cap),
             "spin cap in rad/s": (None, self.spin_cap),
-            "wall skin in m": (None if self.chosen["skin"] else 0.0, self._skin()),
+            "wall skin in m": (
+                None if chosen["skin"] else 0.0,
+                self.walls[0].fixtures[0].shape.radius / self.length if self.walls else "no wall",
+            ),
             "friction": (self.friction, fixture.friction),
             "restitution": (self.scene.restitution, fixture.restitution),
             "sleeping": (self.sleeping if matched else None, world.GetAllowSleeping()),
@@ -274,16 +272,10 @@ class Box2DEngine:
             "float32 rounding of the start in m": (None, rounding(self.scene)),
         }
 
-    def _skin(self) -> float | str:
-        """m, the skin of the first wall."""
-        return self.walls[0].fixtures[0].shape.radius / self.length if self.walls else "no wall"
-
     def versions(self) -> dict[str, str]:
-        """The package; it carries its own copy of Box2D 2.3."""
         return {BOX2D: version(BOX2D)}
 
     def close(self) -> None:
-        """Drop the world; Box2D frees it with the last reference."""
         self.world = self.bodies = self.walls = self.listener = None  # type: ignore[assignment]
 
 
@@ -295,21 +287,14 @@ def fastest(scene: Scene) -> float:
 
 
 class Listener(Box2D.b2ContactListener):  # type: ignore[misc]
-    """Logs (step, i, j, impulse in the engine's units) of every contact with an impulse."""
-
     def __init__(self, engine: Box2DEngine) -> None:
         super().__init__()
         self.engine = engine
         self.log: list[tuple[int, int, int, float]] = []
 
     def PostSolve(self, contact: Any, impulse: Any) -> None:
-        """Called once per step for every touching pair, with or without an impulse."""
+        # Called once per step for every touching pair, with or without an impulse.
         J = impulse.normalImpulses[0]
         if J > 0.0:
             i, j = contact.fixtureA.body.userData, contact.fixtureB.body.userData
             self.log.append((self.engine.steps, i, j, J))
-
-
-def vector(array: Array) -> tuple[float, float]:
-    """A pair of Python floats: the binding takes no numpy scalars."""
-    return float(array[0]), float(array[1])

@@ -15,7 +15,7 @@ import pyb2d3
 
 from crosscheck2d.adapters.advance import onto_torus
 from crosscheck2d.adapters.engine import NOT_READABLE, PASSED, ContactImpulse
-from crosscheck2d.adapters.float32 import must_fit, must_not_be_cut, rounding
+from crosscheck2d.adapters.float32 import must_fit, must_not_be_cut, rounding, vector
 from crosscheck2d.adapters.friction import of_shapes
 from crosscheck2d.adapters.library_versions import version
 from crosscheck2d.adapters.matched import Searched
@@ -97,7 +97,7 @@ LENGTH_UNIT = Lock()
 
 
 def in_its_unit(method: Callable[..., None]) -> Callable[..., None]:
-    """Decorator for a method that sets the length unit and needs it until it returns."""
+    # Decorator for a method that sets the length unit and needs it until it returns.
 
     @wraps(method)
     def alone(*arguments: Any, **named: Any) -> None:
@@ -137,12 +137,11 @@ class Box2DV3:
         self.chosen = (MATCHED if self.matched else SHIPPED) | settings
         self.asked_friction = friction
         self.substeps, self.turning = self.chosen["substeps"], turning
+        self.tuning = tuned(self.chosen)
         self.sleeping = not self.matched if sleeping is None else sleeping
 
     @in_its_unit
     def load(self, scene: Scene, dt: float) -> None:
-        """Build a new world; the length unit is global to the process, so each profile sets its
-        own."""
         must_fit(scene)
         self.scene, self.dt, self.steps = scene, dt, 0
         self.friction = of_shapes(scene, self.matched, self.asked_friction)
@@ -158,8 +157,8 @@ class Box2DV3:
         self.world = pyb2d3.World(gravity=vector(scene.gravity), **self.options)
         self.world.continuous_enabled = self.chosen["continuous"]
         self.world.sleeping_enabled = self.sleeping
-        if self.matched or self._tuning() != tuned(SHIPPED):
-            self.world.set_contact_tuning(*self._tuning())
+        if self.matched or self.tuning != tuned(SHIPPED):
+            self.world.set_contact_tuning(*self.tuning)
         self.world.hit_event_threshold = 0.0  # listening only: report every collision
         self.bodies = [self._disk(i) for i in range(scene.n)]
         self.every = pyb2d3.Bodies()
@@ -172,9 +171,6 @@ class Box2DV3:
             np.array(scene.angular_velocity),
             0,
         )
-
-    def _tuning(self) -> tuple[float, float, float]:
-        return tuned(self.chosen)
 
     def _options(self) -> dict[str, float]:
         given: dict[str, float] = {}
@@ -226,14 +222,11 @@ class Box2DV3:
         body.create_segment_shape(self._shape(), pyb2d3.segment(vector(start), vector(end)))
 
     def apply_force(self, disk: int, force: Array, torque: float) -> None:
-        """Apply force and torque; `step` clears both."""
         self.bodies[disk].apply_force_to_center(vector(force))
         self.bodies[disk].apply_torque(float(torque))
 
     @in_its_unit
     def step(self, count: int = 1) -> None:
-        """`count` calls of `step`; collision events live for one step, so they are collected after
-        each."""
         pyb2d3.set_length_units_per_meter(self.unit)  # another world may have changed it since
         for _ in range(count):
             self.world.step(self.dt, self.substeps)
@@ -262,8 +255,8 @@ class Box2DV3:
             self.bodies[i].set_transform(vector(np.array([x, y])), self.bodies[i].rotation)
 
     def read(self) -> State:
-        """All bodies at once, as float32. The engine keeps (cos, sin), so the angle is unwound from
-        read to read."""
+        # All bodies at once, as float32. The engine keeps (cos, sin), so the angle is unwound from
+        # read to read.
         n, every = self.scene.n, self.every
         position = every.get_positions(np.empty((n, 2), np.float32)).astype(float)
         velocity = every.get_linear_velocities(np.empty((n, 2), np.float32)).astype(float)
@@ -273,7 +266,7 @@ class Box2DV3:
         return State(position, velocity, self._unwound(angular_velocity), angular_velocity)
 
     def _unwound(self, spin: Array) -> Array:
-        """The angles nearest to the prediction from the mean spin since the last read."""
+        # The angles nearest to the prediction from the mean spin since the last read.
         turn = self.every.get_rotations(np.empty((self.scene.n, 2), np.float32)).tolist()
         raw = np.array([atan2(s, c) for c, s in turn])
         expected = self.angle + (self.spin + spin) / 2 * (self.steps - self.seen) * self.dt
@@ -282,11 +275,10 @@ class Box2DV3:
         return self.angle.copy()
 
     def collisions(self) -> list[ContactImpulse]:
-        """From the collision events, which report the approach speed but no impulse."""
+        # From the collision events, which report the approach speed but no impulse.
         return self.log
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
-        """Resolved values are read back if the binding allows it."""
         matched, world, options = self.matched, self.world, self.options
         return {
             "length unit in m": (self.unit if matched else None, self.unit_found),
@@ -299,7 +291,7 @@ class Box2DV3:
             "linear slop in m": (None, NOT_READABLE),
             "speculative margin in m": (None, NOT_READABLE),
             "contact tuning (hertz, damping ratio, push speed in m/s)": (
-                "{:g}, {:g}, {:g}".format(*self._tuning()) if matched else None,
+                "{:g}, {:g}, {:g}".format(*self.tuning) if matched else None,
                 NOT_READABLE,
             ),
             "friction": (self.friction, self.bodies[0].shapes[0].friction),
@@ -318,20 +310,13 @@ class Box2DV3:
         }
 
     def versions(self) -> dict[str, str]:
-        """The package; it carries its own copy of Box2D 3.1."""
         return {"pyb2d3": version("pyb2d3")}
 
     def close(self) -> None:
-        """Bodies before the world: using one afterwards is a segmentation fault."""
+        # Bodies before the world: using one afterwards is a segmentation fault.
         self.bodies, self.every = [], None
         self.world = None
 
 
 def tuned(chosen: Mapping[str, Any]) -> tuple[float, float, float]:
-    """Hertz, damping ratio and push speed in m/s, as `set_contact_tuning` takes them."""
     return chosen["hertz"], chosen["damping_ratio"], chosen["push_speed"]
-
-
-def vector(array: Array) -> tuple[float, float]:
-    """A pair of Python floats."""
-    return float(array[0]), float(array[1])

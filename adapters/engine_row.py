@@ -29,98 +29,75 @@ class Mark(NamedTuple):
 
 
 class AccuracyParameter(NamedTuple):
-    """A parameter with which an engine spends time on accuracy instead of smaller steps.
+    """A parameter with which an engine spends time on accuracy instead of smaller steps."""
 
-    Attributes:
-        what: iterations or substeps.
-        setting: the parameter of `EngineRow.make` with their number.
-        values: the measured values, from cheap to expensive.
-    """
-
-    what: str
-    setting: str
-    values: tuple[int, ...]
+    what: str  # iterations or substeps
+    setting: str  # the parameter of `EngineRow.make` with their number
+    values: tuple[int, ...]  # the measured ones, from cheap to expensive
 
 
 class Variant(NamedTuple):
-    """A changed engine, with which a cause is tested: parameters of `EngineRow.make`, and the
-    change in a few words.
+    """A changed engine, with which a cause is tested."""
 
-    loaded: changes the engine after `load`.
-    """
-
-    settings: Mapping[str, Any]
-    what: str
-    loaded: Callable[[Any], None] | None = None
+    settings: Mapping[str, Any]  # parameters of `EngineRow.make`
+    what: str  # the change in a few words
+    loaded: Callable[[Any], None] | None = None  # changes the engine after `load`
 
 
 @dataclass(frozen=True)
 class EngineRow:
-    """How to make an engine, and everything else that the program needs to know about it.
+    """How to make an engine, and everything else that the program needs to know about it."""
 
-    Attributes:
-        make: makes a new engine; imports its library when called. Takes the parameters that
-            `options`, `work` and `variants` name.
-        summary: one line for `crosscheck list`.
-        alpha: free flight advances by v dt + alpha a dt2 a step: 1/2 is exact, the offset after t
-            is (alpha - 1/2) a dt t. This follows from the order of updates; it is not an error of
-            the adapter. NaN for a user's engine file, in which any order is right.
-        rounding: the relative rounding of the engine's numbers.
-        leaves_state: whether an earlier scene changes the next results, so that each cell needs a
-            new process; False for all of `ENGINES` (a test plays each after others, bit for bit).
-        outside: it is a library; else it is listed among the solvers of this project.
-        distributions: the installed packages, by their names in pip, whose versions affect its
-            numbers; numba, numpy and mini-racer affect those of all engines and need no mention.
-        mark: how it is drawn, the same for all profiles of an engine; None: a colour and a shape
-            are chosen that no other engine has.
-        dash: what tells its lines from those of the engine's other profiles: lengths of stroke and
-            gap in px. With a dash its mark is open; () is a solid line and a filled mark.
-        shape: in place of that of `mark`, where an open and a filled one do not tell all profiles
-            of the engine apart; "": that of `mark`.
-        work: its `AccuracyParameter`; None if it has none.
-        options: a change of one setting, in a few words -> parameters of `make`; `crosscheck speed`
-            measures what it costs and breaks.
-        variants: name, used after a "+" -> a changed engine with which `crosscheck stability` tests
-            a cause.
-        searched: returns the settings that `crosscheck tune` searches; None: there are none.
-        bits_of: another engine whose numbers it reproduces to the last bit, at another cost, in
-            every scene without friction (`coulomb`: and without a torus); if only the numbers
-            count, it plays beside that engine only on request. "": there is none.
-        adds_friction: it plays scenes with friction, which that engine refuses; without friction it
-            never plays beside it.
-        orders_collisions: it uses time-of-impact ordering instead of end-of-step detection; it is
-            ranked separately.
-        departs: a probe of the protocol that it fails because of its physics, not its adapter ->
-            the cause.
-        package: the npm package, pinned in adapters/host/package.json, that it uses and that
-            is fetched once; "": it needs none.
-        wheel: the distribution of which another version is fetched as a wheel, NAME@VERSION; "":
-            there is none.
-        source: a hash of a solver's file, which changes when the file is saved with another text,
-            or of a fetched version; "" for any other engine.
-        exercise: it is a solver's file with the functions of the exercise, which `crosscheck check`
-            judges.
-    """
-
+    # makes a new engine; imports its library when called; takes the parameters that `options`,
+    # `work` and `variants` name
     make: Callable[..., Engine]
-    summary: str
+    summary: str  # one line for `crosscheck list`
+    # Free flight advances by v dt + alpha a dt2 a step: 1/2 is exact, the offset after t is
+    # (alpha - 1/2) a dt t. This follows from the order of updates; it is not an error of the
+    # adapter. NaN for a user's engine file, in which any order is right.
     alpha: float
-    rounding: float
+    rounding: float  # the relative rounding of the engine's numbers
+    # whether an earlier scene changes the next results, so that each cell needs a new process;
+    # False for all of `ENGINES` (a test plays each after others, bit for bit)
     leaves_state: bool = False
-    outside: bool = False
+    outside: bool = False  # it is a library; else it is listed among the solvers of this project
+    # the installed packages, by their names in pip, whose versions affect its numbers; numba, numpy
+    # and mini-racer affect those of all engines and need no mention
     distributions: tuple[str, ...] = ()
+    # how it is drawn, the same for all profiles of an engine; None: a colour and a shape are chosen
+    # that no other engine has
     mark: Mark | None = None
+    # what tells its lines from those of the engine's other profiles: lengths of stroke and gap in
+    # px. With a dash its mark is open; () is a solid line and a filled mark.
     dash: tuple[int, ...] = ()
+    # in place of that of `mark`, where an open and a filled one do not tell all profiles of the
+    # engine apart; "": that of `mark`
     shape: str = ""
     work: AccuracyParameter | None = None
+    # a change of one setting, in a few words -> parameters of `make`; `crosscheck speed` measures
+    # what it costs and breaks
     options: Mapping[str, Mapping[str, Any]] = field(default_factory=dict, hash=False)
+    # name, used after a "+" -> a changed engine with which `crosscheck stability` tests a cause
     variants: Mapping[str, Variant] = field(default_factory=dict, hash=False)
+    # returns the settings that `crosscheck tune` searches; None: there are none
     searched: Callable[[], Searched] | None = None
+    # another engine whose numbers it reproduces to the last bit, at another cost, in every scene
+    # without friction (`coulomb`: and without a torus); if only the numbers count, it plays beside
+    # that engine only on request; "": there is none
     bits_of: str = ""
+    # it plays scenes with friction, which that engine refuses; without friction it never plays
+    # beside it
     adds_friction: bool = False
+    # it uses time-of-impact ordering instead of end-of-step detection; it is ranked separately
     orders_collisions: bool = False
+    # a probe of the protocol that it fails because of its physics, not its adapter -> the cause
     departs: Mapping[str, str] = field(default_factory=dict, hash=False)
+    # the npm package, pinned in adapters/host/package.json, that is fetched once; "": it needs none
     package: str = ""
+    # the distribution of which another version is fetched as a wheel, NAME@VERSION; "": none
     wheel: str = ""
+    # a hash of a solver's file, which changes when the file is saved with another text, or of a
+    # fetched version; "" for any other engine
     source: str = ""
+    # it is a solver's file with the functions of the exercise, which `crosscheck check` judges
     exercise: bool = False

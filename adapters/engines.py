@@ -28,8 +28,8 @@ from crosscheck2d.scenarios.model import Scene
 
 
 def _made(place: str, *arguments: Any, **settings: Any) -> Engine:
-    """An engine of the class "module.Class", imported only now, so that a missing library is a
-    refusal of this engine alone."""
+    # An engine of the class "module.Class", imported only now, so that a missing library is a
+    # refusal of this engine alone.
     module, _, name = place.rpartition(".")
     engine: Engine = getattr(import_module(module), name)(*arguments, **settings)
     return engine
@@ -51,10 +51,6 @@ def _javascript_searched(name: str) -> Searched:
     return SEARCHED[name]
 
 
-def _at_version(library: LibraryAtVersion, *arguments: Any, **settings: Any) -> Engine:
-    return _made("crosscheck2d.adapters.host.apart.EngineApart", library, *arguments, **settings)
-
-
 def _javascript(name: str, profile: str, **settings: Any) -> Engine:
     package = FETCHED[f"{name}:{profile}"].package
     return _made(
@@ -63,7 +59,7 @@ def _javascript(name: str, profile: str, **settings: Any) -> Engine:
 
 
 def _what_moves_is_a_bullet(engine: Any) -> None:
-    """For Box2D 3.1: make the moving disks bullets; bullets do not detect each other."""
+    # For Box2D 3.1: make the moving disks bullets; bullets do not detect each other.
     for body, velocity in zip(engine.bodies, engine.scene.velocity):
         body.bullet = bool(velocity.any())
 
@@ -131,7 +127,7 @@ ENGINES: dict[str, EngineRow] = {
     ),
     "reference:neighbours": _Reference(
         partial(_reference, "neighbours"),
-        "same bits as reference:exercise in less time: 636 lines, no pair tested that is far",
+        "same bits as reference:exercise in less time: 610 lines, no pair tested that is far",
         1.0,
         FLOAT64,
         dash=(7, 5),
@@ -157,7 +153,7 @@ ENGINES: dict[str, EngineRow] = {
     ),
     "reference:ordered": _Reference(
         partial(_reference, "ordered"),
-        "hand-written: exact flight, time-of-impact ordering, friction; 904 lines, no projection",
+        "hand-written: exact flight, time-of-impact ordering, friction; 905 lines, no projection",
         0.5,
         FLOAT64,
         dash=(9, 3, 2, 3),
@@ -321,7 +317,7 @@ def row_of(name: str) -> EngineRow:
 
 
 def packages() -> dict[str, tuple[str, bool]]:
-    """Engine -> the package that other versions of it come in, and whether it is npm's."""
+    # Engine -> the package that other versions of it come in, and whether it is npm's.
     rows = ((name.partition(":")[0], row) for name, row in (ENGINES | FETCHED).items())
     return {
         name: (row.package or row.wheel, bool(row.package))
@@ -342,7 +338,6 @@ def parsed(name: str) -> tuple[str, LibraryAtVersion | None]:
 
 
 def known_row(name: str) -> EngineRow | None:
-    """The row of a name of the tables, or of NAME@VERSION:PROFILE; None for any other name."""
     usual, library = parsed(name)
     row = ENGINES.get(usual) or FETCHED.get(usual)
     if row is None or library is None:
@@ -352,7 +347,9 @@ def known_row(name: str) -> EngineRow | None:
         row,
         make=partial(row.make, library=library)
         if row.package
-        else partial(_at_version, library, *row.make.args),
+        else partial(
+            _made, "crosscheck2d.adapters.host.apart.EngineApart", library, *row.make.args
+        ),
         summary=f"{library.package} {library.version}, {usual.partition(':')[2]}",
         mark=None,
         distributions=(),
@@ -383,5 +380,4 @@ def read_row(name: str) -> EngineRow:
 
 
 def changed(name: str, **settings: Any) -> Engine:
-    """The engine of a row of `ENGINES` with these parameters of its `make`."""
     return ENGINES[name].make(**settings)

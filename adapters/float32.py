@@ -46,6 +46,11 @@ def must_not_be_cut(what: str, values: Array, cap: float, unit: str, by: str) ->
 
 
 def rounding(scene: Scene) -> float:
-    """Largest change of a start position by rounding to float32, in m."""
+    """m, the largest change of a start position by rounding to float32."""
     nearest: Array = scene.position.astype(np.float32).astype(np.float64)
     return float(np.abs(nearest - scene.position).max())
+
+
+def vector(array: Array) -> tuple[float, float]:
+    """A pair of Python floats: the binding takes no numpy scalars."""
+    return float(array[0]), float(array[1])

@@ -11,7 +11,6 @@ class Frictionless(Unsupported):
 
 
 def must_be_frictionless(scene: Scene, who: str) -> None:
-    """Raise `Frictionless` for a scene with friction, which the engine `who` does not model."""
     if scene.friction:
         raise Frictionless(f"{who} does not model friction, the scene has {scene.friction:g}")
 

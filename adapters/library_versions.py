@@ -18,8 +18,8 @@ def version(library: str) -> str:
 
 
 def _box2d() -> str:
-    """The distribution that Box2D 2.3 comes from: both have the same code and give the same bits;
-    see pyproject.toml."""
+    # The distribution that Box2D 2.3 comes from: both have the same code and give the same bits;
+    # see pyproject.toml.
     try:
         version("box2d-py")  # built from source
     except metadata.PackageNotFoundError:
@@ -31,7 +31,6 @@ BOX2D = _box2d()
 
 
 def how_to_add(extra: str) -> str:
-    """What adds an extra, as this program was installed: by uv or pip, in a clone or not."""
     if not CLONE:
         return f'pip install "crosscheck2d[{extra}]"'
     environment = Path(sys.prefix, "pyvenv.cfg")

@@ -17,31 +17,23 @@ GEOMETRY = (
 
 @dataclass(frozen=True)
 class Searched:
-    """The public settings of an engine that `crosscheck tune` searches for its matched profile.
+    """The public settings of an engine that `crosscheck tune` searches for its matched profile."""
 
-    Attributes:
-        chosen: setting -> its present value in the matched profile; a test compares it with the
-            table.
-        settings: setting -> (the values tried besides the chosen one, meaning and unit).
-        pairs: two settings with related effects, tried together: names, values of the first, of the
-            second.
-        left_alone: a setting that is not searched -> why.
-    """
-
-    chosen: Mapping[str, Any]
+    chosen: Mapping[str, Any]  # setting -> its value in the matched profile; a test compares it
+    # setting -> (the values tried besides the chosen one, meaning and unit)
     settings: Mapping[str, tuple[tuple[Any, ...], str]]
+    # two settings with related effects, tried together: names, values of the first, of the second
     pairs: tuple[tuple[tuple[str, str], tuple[Any, ...], tuple[Any, ...]], ...]
-    left_alone: Mapping[str, str]
+    left_alone: Mapping[str, str]  # a setting that is not searched -> why
 
 
 def searched(path: Path = TABLE) -> list[dict[str, str]]:
-    """The rows of the table, in reading order: see `crosscheck2d.reports.tune.search.COLUMNS`."""
+    """The rows of the table, as `crosscheck2d.reports.tune.command.COLUMNS`."""
     with path.open(newline="", encoding="utf-8") as file:
         return list(csv.DictReader(file))
 
 
 def chosen(engine: str, path: Path = TABLE) -> dict[str, str]:
-    """Setting -> its value in the table, for the searched settings of an engine."""
     return {
         row["setting"]: row["value"]
         for row in searched(path)

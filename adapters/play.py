@@ -8,10 +8,8 @@ from dataclasses import replace
 
 from crosscheck2d.adapters.advance import advanced
 from crosscheck2d.adapters.engine import Engine, NotStarted, Unsupported
-from crosscheck2d.adapters.first_collisions import collisions_of
 from crosscheck2d.adapters.friction import Frictionless
-from crosscheck2d.adapters.run import Run, gather, substeps_of, unplayed_run
-from crosscheck2d.adapters.runaway import RUNAWAY, fault_of, reach
+from crosscheck2d.adapters.run import Run, collisions_of, fault_of, gather, reach, substeps_of
 from crosscheck2d.scenarios.model import Scenario, State
 
 Watch = Callable[[State], None]  # called with every valid sample
@@ -32,7 +30,7 @@ def play_once(
         engine = make()
     except ImportError as missing:
         reason = f"{missing.name or missing} cannot be imported: {missing}"
-        return replace(unplayed_run(name, scenario, dt), status="unsupported", reason=reason)
+        return replace(Run.unplayed(name, scenario, dt), status="unsupported", reason=reason)
     with closing(engine):
         return play(engine, name, scenario, dt, watch)
 
@@ -45,8 +43,8 @@ def play(engine: Engine, name: str, scenario: Scenario, dt: float, watch: Watch 
     `MemoryError` and `NotStarted` pass, which are not the engine's fault.
     """
     substeps = substeps_of(scenario, dt)
-    run, states, seconds = unplayed_run(name, scenario, dt), list[State](), 0.0
-    farthest = RUNAWAY * reach(scenario)
+    run, states, seconds = Run.unplayed(name, scenario, dt), list[State](), 0.0
+    farthest = reach(scenario)
     try:
         engine.load(scenario.scene, dt)
         run = replace(run, settings=engine.settings(), versions=engine.versions())

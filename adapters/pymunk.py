@@ -103,7 +103,6 @@ class Pymunk:
         self.changed = settings
 
     def load(self, scene: Scene, dt: float) -> None:
-        """Build a new space; static disks and walls are shapes on its static body."""
         self.scene, self.dt, self.steps = scene, dt, 0
         self.log: list[ContactImpulse] = []
         self.space = pymunk.Space()
@@ -177,13 +176,11 @@ class Pymunk:
             self.log.append(ContactImpulse(self.steps, self.index[a], self.index[b], impulse))
 
     def apply_force(self, disk: int, force: Array, torque: float) -> None:
-        """Add to the body's force and torque; pymunk clears both after a step."""
         if (body := self.bodies[disk]) is not None:
             body.force += tuple(force)
             body.torque += torque
 
     def step(self, count: int = 1) -> None:
-        """`count` calls of `space.step`; pymunk has no torus: disks that leave are shifted."""
         for _ in range(count):
             self.space.step(self.dt)
             self.steps += 1
@@ -201,8 +198,8 @@ class Pymunk:
             self.bodies[self.moving[row]].position = tuple(place)
 
     def _rows(self) -> Array:
-        """(moving, 6): x, y, angle, vx, vy, angular velocity; static bodies follow in the buffer
-        and are cut off."""
+        # (moving, 6): x, y, angle, vx, vy, angular velocity; static bodies follow in the buffer and
+        # are cut off.
         if self.buffer is None:
             moving = (body for body in self.bodies if body is not None)
             rows = [(*b.position, b.angle, *b.velocity, b.angular_velocity) for b in moving]
@@ -214,17 +211,14 @@ class Pymunk:
         return np.frombuffer(self.buffer.float_buf()).reshape(-1, 6)[: len(self.moving)]
 
     def read(self) -> State:
-        """One bulk read into a copy of the start state; static disks keep theirs."""
         rows = self.start.copy()
         rows[self.moving] = self._rows()
         return State(rows[:, :2], rows[:, 3:5], rows[:, 2], rows[:, 5])
 
     def collisions(self) -> list[ContactImpulse]:
-        """From `post_solve`."""
         return self.log
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
-        """Resolved values are read back from the space."""
         shape = next(iter(self.index))
         resolved = {
             "elasticity": shape.elasticity,
@@ -246,10 +240,8 @@ class Pymunk:
         return {name: (self.asked.get(name), value) for name, value in resolved.items()}
 
     def versions(self) -> dict[str, str]:
-        """The wrapper and the C engine inside it."""
         inside = "Munk2D" if int(pymunk.version.partition(".")[0]) >= 7 else "Chipmunk"
         return {"pymunk": pymunk.version, inside: pymunk.chipmunk_version}
 
     def close(self) -> None:
-        """Drop the space; pymunk frees it with the last reference."""
         self.space = self.bodies = self.index = None  # type: ignore[assignment]

@@ -47,7 +47,6 @@ class Reference:
         self.name = variant.__name__.split(".")[-1]
 
     def load(self, scene: Scene, dt: float) -> None:
-        """Copy the scene into the solver's arrays."""
         if self.name not in WITH_FRICTION:
             must_be_frictionless(scene, "this hand-written solver")
         self.dt, self.steps = dt, 0
@@ -79,48 +78,37 @@ class Reference:
         self.advance(0)  # compiles, unless it is compiled already
 
     def _entered(self, disks: Array, world: Array) -> Callable[[int], Iterable[Any]]:
-        """A function that takes the number of steps and returns the collisions; a user's module may
-        lack the fast entry point."""
         if self.variant.__name__ in ADVANCE:
             return partial(ADVANCE[self.variant.__name__], disks, world)
         return partial(self.variant.advance, self.disks, self.world, self.dt)
 
     def apply_force(self, disk: int, force: Array, torque: float) -> None:
-        """Add to the disk's force and torque; `step` clears both."""
         self.disks.force[disk] += force
         self.disks.torque[disk] += torque
         self.forced = True
 
     def step(self, count: int = 1) -> None:
-        """One call into the compiled solver; a force lasts for the first step only."""
         if self.forced:
             self.forced = False
             self.step(1)
             self.disks.force.fill(0.0)
             self.disks.torque.fill(0.0)
             count -= 1
-        if count and (collisions := self.advance(count)):
-            self._keep(collisions)
-        self.steps += count
-
-    def _keep(self, collisions: Iterable[Any]) -> None:
-        if self.listening:
+        if count and (collisions := self.advance(count)) and self.listening:
             self.log += [
                 ContactImpulse(self.steps + k, i, j, impulse) for k, i, j, impulse in collisions
             ]
+        self.steps += count
 
     def read(self) -> State:
-        """Copies of the solver's arrays."""
         disks = self.disks
         kept = disks.position, disks.velocity, disks.angle, disks.angular_velocity
         return State(*(array.astype(np.float64) for array in kept))
 
     def collisions(self) -> list[ContactImpulse]:
-        """As the solver returned them."""
         return self.log
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
-        """The variant's method and its options; everything else is in the scene."""
         method = {setting: (None, value) for setting, value in METHODS.get(self.name, {}).items()}
         if self.name == "ordered":
             return method
@@ -133,7 +121,6 @@ class Reference:
         }
 
     def versions(self) -> dict[str, str]:
-        """Versions of the compiler, which affects the last bit."""
         return {"numba": version("numba"), "numpy": version("numpy")}
 
     def close(self) -> None:

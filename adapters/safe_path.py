@@ -20,8 +20,6 @@ PROGRAM = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))  # the fol
 
 
 class OwnPackages:
-    """Finds this package, whatever its folder is called, and the tests in it."""
-
     def __init__(self) -> None:
         from importlib.machinery import PathFinder  # now: later this finder would be asked
         from importlib.util import spec_from_file_location
@@ -31,7 +29,6 @@ class OwnPackages:
     def find_spec(
         self, name: str, _path: object = None, _target: object = None
     ) -> "ModuleSpec | None":
-        """Called through `sys.meta_path`."""
         if name == PACKAGE:
             return self.at_place(name, os.path.join(PROGRAM, "__init__.py"))
         return self.finder.find_spec(name, [PROGRAM]) if name == TESTS else None

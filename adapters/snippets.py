@@ -241,7 +241,7 @@ def _box2d_v3(engine: Any) -> dict[str, Any]:
     return {
         "unit": engine.unit,
         "options": "".join(f", {key}={value!r}" for key, value in engine.options.items()),
-        "tuning": ", ".join(map(repr, engine._tuning())),
+        "tuning": ", ".join(map(repr, engine.tuning)),
         "gravity": tuple(engine.scene.gravity.tolist()),
         "continuous": engine.chosen["continuous"],
         "bullet": engine.chosen["bullet"],
@@ -252,7 +252,6 @@ def _box2d_v3(engine: Any) -> dict[str, Any]:
 
 
 def _read(engine: Any) -> tuple[dict[str, Any], dict[str, str]]:
-    """What a JavaScript engine resolved, and what all of them have."""
     resolved = {name: value for name, (_, value) in engine.settings().items()}
     friction = of_shapes(engine.scene, engine.profile == "matched", None)
     stated = "" if friction is None else f", friction: {json.dumps(friction)}"
@@ -260,7 +259,6 @@ def _read(engine: Any) -> tuple[dict[str, Any], dict[str, str]]:
 
 
 def _chosen(profile: str, library: str) -> Mapping[str, Any]:
-    """What the matched profile chooses; nothing for the profile as shipped."""
     searched = row_of(f"{library}:matched").searched
     return searched().chosen if searched is not None and profile == "matched" else {}
 

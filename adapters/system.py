@@ -73,7 +73,6 @@ def holds_more(pid: int, most: int) -> bool:
 
 
 def write_no_core() -> None:
-    """Disable core dumps of this process."""
     if KERNEL:
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
@@ -101,28 +100,22 @@ def watch(is_time: Callable[[], bool], status: int) -> None:
 
 
 def end_all(pid: int) -> None:
-    """End a process and all its children, on Linux also those of its group whose parent has ended;
-    does nothing if the process has ended."""
+    """End the children of a process, and theirs, then the process; does nothing if it has ended.
+
+    On Linux the process ends with its group, and so do children whose parent has ended.
+    """
     try:
-        end_tree(pid)  # also children that have left the group
+        import psutil
+
+        with suppress(psutil.NoSuchProcess):
+            process = psutil.Process(pid)  # its children may have left the group
+            for each in process.children(recursive=True) + [process] * (not KERNEL):
+                with suppress(psutil.NoSuchProcess):
+                    each.kill()
     finally:  # even without memory for psutil
         if KERNEL:
             with suppress(ProcessLookupError):
                 os.killpg(pid, signal.SIGKILL)
-
-
-def end_tree(pid: int) -> None:
-    """End the children of a process, and theirs, then the process; does nothing if it has ended.
-
-    On Linux the process ends with its group, so that one that ends itself ends all of the group.
-    """
-    import psutil
-
-    with suppress(psutil.NoSuchProcess):
-        process = psutil.Process(pid)
-        for each in process.children(recursive=True) + [process] * (not KERNEL):
-            with suppress(psutil.NoSuchProcess):
-                each.kill()
 
 
 def lock(file: int) -> None:
@@ -165,7 +158,7 @@ class Pieces:
             return None
 
     def fetch(self) -> None:
-        """In a thread, because Windows has no `select` for pipes: read everything."""
+        # In a thread, because Windows has no `select` for pipes: read everything.
         with suppress(OSError, ValueError):  # closed
             while piece := os.read(self.pipe.fileno(), PIECE):
                 self.read.put(piece)
@@ -173,7 +166,6 @@ class Pieces:
 
 
 def most_files() -> int:
-    """The limit of open files of a process, as far as it is known."""
     return resource.getrlimit(resource.RLIMIT_NOFILE)[0] if KERNEL else sys.maxsize
 
 
@@ -217,8 +209,6 @@ class TimeIsUp(BaseException):
 
 @contextmanager
 def _timers(seconds: float, waiting: float, stop: Callable[[], BaseException]) -> Iterator[None]:
-    """`stopped_after` by signals."""
-
     def ring(*_: object) -> None:
         raise stop()
 

@@ -28,7 +28,7 @@ def world_block(world: World, dt: float) -> np.ndarray:
 
 
 @inlined
-def disks_of(block) -> Disks:  # type: ignore[no-untyped-def]
+def disks_of(block) -> Disks:
     """The disks of a block, as views: writing to them writes to the block."""
     n = len(block) // 14
     return Disks(
@@ -46,8 +46,7 @@ def disks_of(block) -> Disks:  # type: ignore[no-untyped-def]
 
 
 @inlined
-def world_of(block) -> World:  # type: ignore[no-untyped-def]
-    """The world that a block holds."""
+def world_of(block) -> World:
     return World(
         restitution=block[1],
         friction=block[2],
@@ -61,32 +60,27 @@ def world_of(block) -> World:  # type: ignore[no-untyped-def]
 
 
 @compiled
-def exercise_advance(disks, world, count: int) -> list:  # type: ignore[no-untyped-def]
-    """`exercise.advance` of two blocks."""
+def exercise_advance(disks, world, count: int) -> list:
     return exercise.advance(disks_of(disks), world_of(world), world[0], count)
 
 
 @compiled
-def neighbours_advance(disks, world, count: int) -> list:  # type: ignore[no-untyped-def]
-    """`neighbours.advance` of two blocks."""
+def neighbours_advance(disks, world, count: int) -> list:
     return neighbours.advance(disks_of(disks), world_of(world), world[0], count)
 
 
 @compiled
-def coulomb_advance(disks, world, count: int) -> list:  # type: ignore[no-untyped-def]
-    """`coulomb.advance` of two blocks."""
+def coulomb_advance(disks, world, count: int) -> list:
     return coulomb.advance(disks_of(disks), world_of(world), world[0], count)
 
 
 @compiled
-def lesson_advance(disks, world, count: int) -> list:  # type: ignore[no-untyped-def]
-    """`lesson.advance` of two blocks."""
+def lesson_advance(disks, world, count: int) -> list:
     return lesson.advance(disks_of(disks), world_of(world), world[0], count)
 
 
 @compiled
-def ordered_advance(disks, world, count: int) -> list:  # type: ignore[no-untyped-def]
-    """`ordered.advance` of two blocks."""
+def ordered_advance(disks, world, count: int) -> list:
     return ordered.advance(disks_of(disks), world_of(world), world[0], count)
 
 

@@ -40,7 +40,7 @@ def step(disks: Disks, world: World, dt: float, k: int, collisions: list) -> Non
 
 
 @kernel
-def carry_over(x, world: World) -> None:  # type: ignore[no-untyped-def]
+def carry_over(x, world: World) -> None:
     """A centre beyond an edge of the box goes on from the opposite edge; its velocity stays."""
     for i in range(len(x)):
         for axis in range(2):

@@ -107,7 +107,7 @@ def collide_wall(disks: Disks, i: int, w: int, world: World) -> float:
 
 
 @kernel
-def touching(x, radius, a: int, b: int) -> bool:  # type: ignore[no-untyped-def]
+def touching(x, radius, a: int, b: int) -> bool:
     """Whether the centres are closer than the sum of the radii (both sides squared)."""
     dx, dy = x[a, 0] - x[b, 0], x[a, 1] - x[b, 1]
     reach = radius[a] + radius[b]
@@ -115,7 +115,7 @@ def touching(x, radius, a: int, b: int) -> bool:  # type: ignore[no-untyped-def]
 
 
 @kernel
-def touching_wall(x, radius, i: int, walls, w: int) -> bool:  # type: ignore[no-untyped-def]
+def touching_wall(x, radius, i: int, walls, w: int) -> bool:
     """Whether the nearest point of wall `w` is closer than the radius (both sides squared)."""
     px, py = nearest_point(walls, w, x[i, 0], x[i, 1])
     dx, dy = x[i, 0] - px, x[i, 1] - py
@@ -142,7 +142,7 @@ def share_of_a(mass_a: float, mass_b: float, split: int) -> float:
 
 
 @kernel
-def nearest_point(walls, w: int, x: float, y: float) -> tuple[float, float]:  # type: ignore[no-untyped-def]
+def nearest_point(walls, w: int, x: float, y: float) -> tuple[float, float]:
     """The point of segment `w` nearest to (x, y)."""
     ax, ay = walls[w, 0, 0], walls[w, 0, 1]
     ux, uy = walls[w, 1, 0] - ax, walls[w, 1, 1] - ay
@@ -151,14 +151,14 @@ def nearest_point(walls, w: int, x: float, y: float) -> tuple[float, float]:  # 
 
 
 @kernel
-def move(rows, i: int, nx: float, ny: float, by: float) -> None:  # type: ignore[no-untyped-def]
+def move(rows, i: int, nx: float, ny: float, by: float) -> None:
     """Add `by` times n to row `i`."""
     rows[i, 0] += by * nx
     rows[i, 1] += by * ny
 
 
 @kernel
-def wrap(x, world: World) -> None:  # type: ignore[no-untyped-def]
+def wrap(x, world: World) -> None:
     """As `projectObjects`: a centre beyond an edge of the box is set onto the opposite edge; its
     velocity stays."""
     for axis in range(2):

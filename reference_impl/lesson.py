@@ -110,14 +110,14 @@ def collide(disks: Disks, a: int, b: int, world: World) -> float:
 
 
 @compiled
-def move(rows, i: int, nx: float, ny: float, by: float) -> None:  # type: ignore[no-untyped-def]
+def move(rows, i: int, nx: float, ny: float, by: float) -> None:
     """Add `by` times n to row `i`."""
     rows[i, 0] += by * nx
     rows[i, 1] += by * ny
 
 
 @compiled
-def wrap(x, world: World) -> None:  # type: ignore[no-untyped-def]
+def wrap(x, world: World) -> None:
     """A centre beyond an edge of the box goes on from the opposite edge; its velocity stays."""
     for i in range(len(x)):
         for axis in range(2):

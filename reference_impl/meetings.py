@@ -1,8 +1,8 @@
 """When disks, walls and edges meet, and the agenda of a step: the meetings that are still to come.
 
-All have flown to the end of the step. A search asks the pairs of the neighbour list once; after
-each meeting it asks again only those of the disks whose way has changed, so the cost of a meeting
-does not grow with the number of disks.
+All have flown to the end of the step. The pairs of the neighbour list are tested once, and after
+each meeting only those of the disks whose way has changed: the cost of a meeting does not grow with
+the number of disks.
 """
 
 from math import inf, sqrt
@@ -11,14 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .compiled import compiled, internal, kernel
-from .neighbour_list import (
-    EDGES,
-    PAIRS,
-    STRIDE,
-    WALLS,
-    NeighbourList,
-    account_for,
-)
+from .neighbour_list import EDGES, PAIRS, ROUNDING, STRIDE, WALLS, NeighbourList, account_for
 from .state import Disks, World
 
 NOBODY, EDGE = -1, 1 << 30  # in place of a disk: none, and the edge of the world
@@ -61,7 +54,7 @@ def empty_agenda(near: NeighbourList) -> Agenda:
 
 
 @kernel
-def bodies_of(near: NeighbourList, row: int) -> tuple[int, int]:
+def bodies(near: NeighbourList, row: int) -> tuple[int, int]:
     """The disk and the other disk, wall j = -1 - w, or edge of a row."""
     if row < near.found[PAIRS]:
         return int(near.first[row]), int(near.second[row])
@@ -72,58 +65,58 @@ def bodies_of(near: NeighbourList, row: int) -> tuple[int, int]:
 
 
 @internal
-def meeting_of(  # type: ignore[no-untyped-def]
+def meeting_time(
     disks: Disks, world: World, acceleration, near: NeighbourList, i: int, j: int, now: float
 ) -> float:
     """When disk i meets disk, wall or edge j from `now` on, or inf."""
     if j == EDGE:
-        return of_edge(disks, world, i, now)
+        return edge_time(disks, world, i, now)
     if j < 0:
-        return of_wall(disks, world, acceleration, near, i, -1 - j, now)
-    return of_disks(disks, world, acceleration, near, i, j, now)
+        return wall_time(disks, world, acceleration, near, i, -1 - j, now)
+    return pair_time(disks, world, acceleration, near, i, j, now)
 
 
 @kernel
-def put_down(agenda: Agenda, row: int, s: float) -> None:
-    """Row `row` of the list is due at s, if that is not inf."""
+def add_meeting(agenda: Agenda, row: int, s: float) -> None:
+    """Row `row` of the list meets at s, if that is not inf."""
     if s < inf:
         agenda.due[agenda.length[DUE]], agenda.time[agenda.length[DUE]] = row, s
         agenda.length[DUE] += 1
 
 
 @kernel
-def ask_all(  # type: ignore[no-untyped-def]
+def list_meetings(
     disks: Disks, world: World, acceleration, near: NeighbourList, agenda: Agenda, now: float
 ) -> None:
-    """Put down all meetings from `now` on."""
+    """Fill the agenda with all meetings from `now` on."""
     pairs, walls = near.found[PAIRS], near.found[WALLS]
     for c in range(agenda.length[CHANGED]):
         agenda.stale[agenda.changed[c]] = False
     agenda.length[DUE] = agenda.length[CHANGED] = 0
     for p in range(pairs):
         i, j = int(near.first[p]), int(near.second[p])
-        put_down(agenda, p, of_disks(disks, world, acceleration, near, i, j, now))
+        add_meeting(agenda, p, pair_time(disks, world, acceleration, near, i, j, now))
     for b in range(walls):
         i, w = int(near.disk[b]), int(near.wall[b])
-        put_down(agenda, pairs + b, of_wall(disks, world, acceleration, near, i, w, now))
+        add_meeting(agenda, pairs + b, wall_time(disks, world, acceleration, near, i, w, now))
     for e in range(near.found[EDGES]):
-        put_down(agenda, pairs + walls + e, of_edge(disks, world, int(near.edge[e]), now))
+        add_meeting(agenda, pairs + walls + e, edge_time(disks, world, int(near.edge[e]), now))
 
 
 @kernel
-def find_rows(near: NeighbourList, agenda: Agenda) -> None:
+def index_rows(near: NeighbourList, agenda: Agenda) -> None:
     """The rows of each disk, in order."""
     start, rows = agenda.start, near.found[PAIRS] + near.found[WALLS] + near.found[EDGES]
     start[:] = 0
     for row in range(rows):
-        i, j = bodies_of(near, row)
+        i, j = bodies(near, row)
         start[i] += 1
         if 0 <= j < EDGE:
             start[j] += 1
     for d in range(1, len(start)):
         start[d] += start[d - 1]
     for row in range(rows - 1, -1, -1):
-        i, j = bodies_of(near, row)
+        i, j = bodies(near, row)
         start[i] -= 1
         agenda.row[start[i]] = row
         if 0 <= j < EDGE:
@@ -133,26 +126,37 @@ def find_rows(near: NeighbourList, agenda: Agenda) -> None:
 
 
 @kernel
-def change(disks: Disks, near: NeighbourList, agenda: Agenda, d: int, way: float) -> None:
-    """Disk d goes another way from now on, and gets no farther than `way` m in a step."""
-    account_for(near, disks.position, d, way)
+def way_in_step(disks: Disks, acceleration, i: int, dt: float) -> float:
+    """m: disk i gets no farther in a step."""
+    x, v, a = disks.position, disks.velocity, acceleration
+    speed = sqrt(v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1])
+    strength = sqrt(a[i, 0] * a[i, 0] + a[i, 1] * a[i, 1])
+    return (speed + strength * abs(dt)) * abs(dt) + ROUNDING * max(abs(x[i, 0]), abs(x[i, 1]))
+
+
+@kernel
+def mark_changed(
+    disks: Disks, acceleration, near: NeighbourList, agenda: Agenda, d: int, dt: float
+) -> None:
+    """Disk d goes another way from now on."""
+    account_for(near, disks.position, d, way_in_step(disks, acceleration.now, d, dt))
     if not agenda.stale[d]:
         agenda.stale[d], agenda.changed[agenda.length[CHANGED]] = True, d
         agenda.length[CHANGED] += 1
 
 
 @kernel
-def ask_changed(  # type: ignore[no-untyped-def]
+def update_meetings(
     disks: Disks, world: World, acceleration, near: NeighbourList, agenda: Agenda, now: float
 ) -> None:
-    """Put down the meetings from `now` on of the disks that go another way."""
+    """Renew the meetings from `now` on of the disks that go another way."""
     stale, keep = agenda.stale, 0
     if agenda.length[CHANGED] == 0:
         return
     if agenda.length[INDEXED] == 0:
-        find_rows(near, agenda)
+        index_rows(near, agenda)
     for c in range(agenda.length[DUE]):
-        i, j = bodies_of(near, agenda.due[c])
+        i, j = bodies(near, agenda.due[c])
         if not (stale[i] or (0 <= j < EDGE and stale[j])):
             agenda.due[keep], agenda.time[keep] = agenda.due[c], agenda.time[c]
             keep += 1
@@ -161,22 +165,22 @@ def ask_changed(  # type: ignore[no-untyped-def]
         d = int(agenda.changed[c])
         for k in range(agenda.start[d], agenda.start[d + 1]):
             row = int(agenda.row[k])
-            i, j = bodies_of(near, row)
-            other = j if i == d else i
-            if not (0 <= other < EDGE and stale[other]):  # who is still to be asked
-                put_down(agenda, row, meeting_of(disks, world, acceleration, near, i, j, now))
+            i, j = bodies(near, row)
+            partner = j if i == d else i
+            if not (0 <= partner < EDGE and stale[partner]):  # whose turn comes later
+                add_meeting(agenda, row, meeting_time(disks, world, acceleration, near, i, j, now))
         stale[d] = False
     agenda.length[CHANGED] = 0
 
 
 @kernel
-def first_due(  # type: ignore[no-untyped-def]
+def first_meeting(
     disks: Disks, world: World, acceleration, near: NeighbourList, agenda: Agenda, now, dt: float
 ):
     """(s, i, j) of the first meeting from `now` on: of two disks, of a disk and wall j = -1 - w, or
     the edge. Of meetings at the same instant, that of the least i; of a disk, before a wall."""
-    asked_earlier = agenda.length[CHANGED] > 0
-    ask_changed(disks, world, acceleration, near, agenda, now)
+    changed = agenda.length[CHANGED] > 0
+    update_meetings(disks, world, acceleration, near, agenda, now)
     while True:
         soon = inf
         for c in range(agenda.length[DUE]):
@@ -188,10 +192,10 @@ def first_due(  # type: ignore[no-untyped-def]
         for c in range(agenda.length[DUE]):
             if agenda.time[c] <= soon:
                 row = int(agenda.due[c])
-                i, j = bodies_of(near, row)
+                i, j = bodies(near, row)
                 s = agenda.time[c]
-                if asked_earlier:
-                    s = meeting_of(disks, world, acceleration, near, i, j, now)
+                if changed:
+                    s = meeting_time(disks, world, acceleration, near, i, j, now)
                     agenda.time[c] = s
                 if s < first[0] or (s == first[0] < inf and (i, row) < (first[1], least)):
                     first, least = (s, i, j), row
@@ -200,25 +204,21 @@ def first_due(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def first_of_all(  # type: ignore[no-untyped-def]
-    disks: Disks, world: World, acceleration, near: NeighbourList, now: float
-):
-    """As `first_due`, where the list does not hold: asks everybody."""
+def first_of_all_pairs(disks: Disks, world: World, acceleration, near: NeighbourList, now: float):
+    """As `first_meeting`, where the list does not hold: of all pairs."""
     first = inf, NOBODY, NOBODY
     for i in range(len(disks.radius)):
         for j in range(i + 1, len(disks.radius)):
-            first = sooner(first, meeting_of(disks, world, acceleration, near, i, j, now), i, j)
+            first = sooner(first, meeting_time(disks, world, acceleration, near, i, j, now), i, j)
         for w in range(len(world.walls)):
-            s = meeting_of(disks, world, acceleration, near, i, -1 - w, now)
+            s = meeting_time(disks, world, acceleration, near, i, -1 - w, now)
             first = sooner(first, s, i, -1 - w)
-        first = sooner(first, of_edge(disks, world, i, now), i, EDGE)
+        first = sooner(first, edge_time(disks, world, i, now), i, EDGE)
     return first
 
 
 @kernel
-def sooner(  # type: ignore[no-untyped-def]
-    first, s: float, i: int, j: int
-):
+def sooner(first, s: float, i: int, j: int):
     """The earlier of two meetings."""
     if s < first[0] or (s == first[0] and i < first[1]):
         return s, i, j
@@ -226,13 +226,13 @@ def sooner(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def of_disks(  # type: ignore[no-untyped-def]
+def pair_time(
     disks: Disks, world: World, acceleration, near: NeighbourList, i: int, j: int, now: float
 ) -> float:
     """When two disks meet from `now` on, or inf."""
     x, radius, mass, held = disks.position, disks.radius, disks.mass, acceleration.held
-    # Who met within the step cannot be farther apart at its end than both ways: passing through is
-    # seen, too.
+    # Two that met within the step are no farther apart at its end than both ways: also those that
+    # have passed through each other.
     dx, dy = x[i, 0] - x[j, 0], x[i, 1] - x[j, 1]
     reach = radius[i] + radius[j] + 2.0 * near.length[STRIDE]
     if dx * dx + dy * dy < reach * reach and not (mass[i] == inf and mass[j] == inf):
@@ -242,7 +242,7 @@ def of_disks(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def of_wall(  # type: ignore[no-untyped-def]
+def wall_time(
     disks: Disks, world: World, acceleration, near: NeighbourList, i: int, w: int, now: float
 ) -> float:
     """When a disk meets a wall from `now` on, or inf."""
@@ -257,7 +257,7 @@ def of_wall(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def of_edge(disks: Disks, world: World, i: int, now: float) -> float:
+def edge_time(disks: Disks, world: World, i: int, now: float) -> float:
     """When the centre of a disk leaves the box from `now` on, or inf."""
     first, x = inf, disks.position
     if disks.mass[i] == inf:
@@ -270,7 +270,7 @@ def of_edge(disks: Disks, world: World, i: int, now: float) -> float:
 
 
 @kernel
-def path_of(disks: Disks, world: World, acceleration, i: int, j: int):  # type: ignore[no-untyped-def]
+def path_of(disks: Disks, world: World, acceleration, i: int, j: int):
     """How disk i moves as seen from disk j, or from the start of wall w = -1 - j: place, velocity,
     acceleration; the wall, which a disk has without length; and the reach."""
     x, v, a, walls, w = disks.position, disks.velocity, acceleration, world.walls, -1 - j
@@ -284,7 +284,7 @@ def path_of(disks: Disks, world: World, acceleration, i: int, j: int):  # type: 
 
 
 @kernel
-def contact(path, s: float) -> tuple[float, float, float, float]:  # type: ignore[no-untyped-def]
+def contact(path, s: float) -> tuple[float, float, float, float]:
     """At s: the gap in m, how fast it opens in m/s, and the normal, from the nearest point of the
     other to the disk."""
     x, y, u, v, a, b, along, up, reach = path
@@ -298,7 +298,7 @@ def contact(path, s: float) -> tuple[float, float, float, float]:  # type: ignor
 
 
 @compiled
-def meeting(path, since: float, leeway: float) -> float:  # type: ignore[no-untyped-def]
+def meeting(path, since: float, leeway: float) -> float:
     """The first s from `since` to 0 at which the gap is closed and closes on, or inf, also where it
     ends within the leeway."""
     low, high = since, 0.0
@@ -307,15 +307,15 @@ def meeting(path, since: float, leeway: float) -> float:  # type: ignore[no-unty
         return inf
     # it turns in between: from closing to opening, or, as a ball thrown up, the other way
     if opening == closing:
-        turn = halved(path, low, high, closing)
+        turn = turning_time(path, low, high, closing)
         low, high = (low, turn) if closing else (turn, high)
     if contact(path, high)[0] >= -leeway * path[8]:
         return inf
-    return low if contact(path, low)[0] <= 0.0 else root(path, low, high)
+    return low if contact(path, low)[0] <= 0.0 else closing_time(path, low, high)
 
 
 @compiled
-def halved(path, low: float, high: float, closing: bool) -> float:  # type: ignore[no-untyped-def]
+def turning_time(path, low: float, high: float, closing: bool) -> float:
     """Where the gap turns, to a 2^-50 of the step: its least or greatest value does not tell the
     difference."""
     for _ in range(50):
@@ -328,7 +328,7 @@ def halved(path, low: float, high: float, closing: bool) -> float:  # type: igno
 
 
 @compiled
-def root(path, low: float, high: float) -> float:  # type: ignore[no-untyped-def]
+def closing_time(path, low: float, high: float) -> float:
     """Where a gap that is open at low and closed at high closes: Newton, halving where that would
     leave the bracket."""
     s = high
@@ -338,10 +338,10 @@ def root(path, low: float, high: float) -> float:  # type: ignore[no-untyped-def
             low = s
         else:
             high = s
-        following = s - gap / rate
-        if not low < following < high:
-            following = (low + high) / 2
-        if following == s or not low < following < high:
+        next_s = s - gap / rate
+        if not low < next_s < high:
+            next_s = (low + high) / 2
+        if next_s == s or not low < next_s < high:
             break
-        s = following
+        s = next_s
     return s

@@ -45,7 +45,7 @@ class NeighbourList(NamedTuple):
 
 
 @compiled
-def empty_list(radius, walls: int) -> NeighbourList:  # type: ignore[no-untyped-def]
+def empty_list(radius, walls: int) -> NeighbourList:
     """Room for the list of disks of these radii (n,) m and so many walls; it does not hold yet."""
     n = len(radius)
     pairs, sides = min(n * (n - 1) // 2, ROOM * n), min(n * walls, ROOM * n)
@@ -82,7 +82,7 @@ def take_step(near: NeighbourList, faster: float) -> None:
 
 
 @kernel
-def account_for(near: NeighbourList, x, i: int, stride: float) -> None:  # type: ignore[no-untyped-def]
+def account_for(near: NeighbourList, x, i: int, stride: float) -> None:
     """A collision has moved disk i, x (n, 2) m, and from now on it moves by up to `stride` m a
     step: in this one, too, where a collision acts before its end."""
     dx, dy = x[i, 0] - near.home[i, 0], x[i, 1] - near.home[i, 1]
@@ -94,7 +94,7 @@ def account_for(near: NeighbourList, x, i: int, stride: float) -> None:  # type:
 
 
 @compiled
-def build_list(near: NeighbourList, x, radius, world: World, left: int) -> None:  # type: ignore[no-untyped-def]
+def build_list(near: NeighbourList, x, radius, world: World, left: int) -> None:
     """Find what is near anew: all pairs of the disks at x (n, 2) m that are apart by less than a
     skin, and those within half a skin of a wall or an edge; `left` steps to go.
 
@@ -117,7 +117,7 @@ def build_list(near: NeighbourList, x, radius, world: World, left: int) -> None:
 
 
 @kernel
-def skin_for(radius, stride: float, left: int) -> float:  # type: ignore[no-untyped-def]
+def skin_for(radius, stride: float, left: int) -> float:
     """m: the thicker, the more pairs are asked in vain; the thinner, the sooner the list is used
     up. Few steps that are left are taken with one list."""
     size, way = radius.mean(), min(LASTS, left) * stride
@@ -125,7 +125,7 @@ def skin_for(radius, stride: float, left: int) -> float:  # type: ignore[no-unty
 
 
 @kernel
-def find_by_all_pairs(near: NeighbourList, x, radius, skin: float) -> None:  # type: ignore[no-untyped-def]
+def find_by_all_pairs(near: NeighbourList, x, radius, skin: float) -> None:
     """For `FEW` disks or fewer, whose pairs always fit into the list."""
     count = 0
     for i in range(len(radius)):
@@ -138,7 +138,7 @@ def find_by_all_pairs(near: NeighbourList, x, radius, skin: float) -> None:  # t
 
 
 @kernel
-def find_walls(near: NeighbourList, x, radius, walls, margin: float) -> None:  # type: ignore[no-untyped-def]
+def find_walls(near: NeighbourList, x, radius, walls, margin: float) -> None:
     """The disks that are within the margin of the upright rectangle around a wall, and which."""
     count = 0
     for i in range(len(radius)):
@@ -156,7 +156,7 @@ def find_walls(near: NeighbourList, x, radius, walls, margin: float) -> None:  #
 
 
 @kernel
-def find_edges(near: NeighbourList, x, world: World, margin: float) -> None:  # type: ignore[no-untyped-def]
+def find_edges(near: NeighbourList, x, world: World, margin: float) -> None:
     """The disks that may leave the box while they use up the margin."""
     left, right = world.low[0] + margin, world.high[0] - margin
     low, high, count = world.low[1] + margin, world.high[1] - margin, 0
@@ -168,7 +168,7 @@ def find_edges(near: NeighbourList, x, world: World, margin: float) -> None:  # 
 
 
 @compiled
-def find_by_cells(near: NeighbourList, x, radius, skin: float) -> None:  # type: ignore[no-untyped-def]
+def find_by_cells(near: NeighbourList, x, radius, skin: float) -> None:
     """For more disks: tests only the pairs in neighbouring cells."""
     # wider than needed by more than rounding
     cells = sort_into_cells(x, radius, 1.001 * (2.0 * radius.max() + skin))
@@ -176,7 +176,10 @@ def find_by_cells(near: NeighbourList, x, radius, skin: float) -> None:  # type:
     near.found[PAIRS] = NO_ROOM
     if len(cells.disk) > 0 and len(first) <= len(near.first):
         near.found[PAIRS] = count = len(first)
-        put_in_order(near.first[:count], near.second[:count], first, second, len(x))
+        # the order of the double loop: by the second, then by the first, which keeps that order
+        lesser, greater = np.empty_like(first), np.empty_like(second)
+        sort_by(second, first, len(x), greater, lesser)
+        sort_by(lesser, greater, len(x), near.first[:count], near.second[:count])
         for p in range(count):
             near.reach[p] = radius[near.first[p]] + radius[near.second[p]]
 
@@ -199,7 +202,7 @@ class Cells(NamedTuple):
 
 
 @compiled
-def sort_into_cells(x, radius, side: float) -> Cells:  # type: ignore[no-untyped-def]
+def sort_into_cells(x, radius, side: float) -> Cells:
     """A counting sort of the disks at x (n, 2) m by their cells of `side` m."""
     n, count = len(x), 16
     while count < n:
@@ -230,7 +233,7 @@ def sort_into_cells(x, radius, side: float) -> Cells:  # type: ignore[no-untyped
 
 
 @compiled
-def near_pairs(cells: Cells, skin: float):  # type: ignore[no-untyped-def]
+def near_pairs(cells: Cells, skin: float):
     """(p,), (p,): the pairs that are apart by less than the skin, first < second, in no order."""
     n = cells.start[-3] if len(cells.disk) else 0
     first, second = np.empty(4 * n, np.uint32), np.empty(4 * n, np.uint32)
@@ -238,12 +241,13 @@ def near_pairs(cells: Cells, skin: float):  # type: ignore[no-untyped-def]
     while q < n and count <= ROOM * n:
         q, count = add_pairs(cells, skin, first, second, q, count)
         if q < n:
-            first, second = longer(first), longer(second)
+            first = np.concatenate((first, np.empty_like(first)))  # as much room again
+            second = np.concatenate((second, np.empty_like(second)))
     return first[:count], second[:count]
 
 
 @kernel
-def add_pairs(cells: Cells, skin: float, first, second, q: int, count: int) -> tuple[int, int]:  # type: ignore[no-untyped-def]
+def add_pairs(cells: Cells, skin: float, first, second, q: int, count: int) -> tuple[int, int]:
     """Write the pairs of the disks from q on behind the first `count`, as far as there is room;
     returns both anew."""
     start, disk, place, last = cells.start, cells.disk, cells.place, len(cells.start) - 4
@@ -268,22 +272,7 @@ def add_pairs(cells: Cells, skin: float, first, second, q: int, count: int) -> t
 
 
 @compiled
-def longer(array):  # type: ignore[no-untyped-def]
-    """The array (p,) with as much room again."""
-    return np.concatenate((array, np.empty_like(array)))
-
-
-@compiled
-def put_in_order(firsts, seconds, first, second, n: int) -> None:  # type: ignore[no-untyped-def]
-    """Write the pairs in the order of the double loop: sorted by the second, then by the first,
-    which keeps that order."""
-    lesser, greater = np.empty_like(first), np.empty_like(second)
-    sort_by(second, first, n, greater, lesser)
-    sort_by(lesser, greater, n, firsts, seconds)
-
-
-@compiled
-def sort_by(key, other, n: int, keys, others) -> None:  # type: ignore[no-untyped-def]
+def sort_by(key, other, n: int, keys, others) -> None:
     """Write both (p,) arrays by a counting sort of the keys, numbers below n; equal keys stay in
     order."""
     free = np.zeros(n + 1, np.uint32)

@@ -11,12 +11,7 @@ import numpy as np
 
 from . import exercise
 from .compiled import compiled, inlined, kernel, pasted
-from .exercise import (
-    collide,
-    collide_wall,
-    touching_wall,
-    wrap,
-)
+from .exercise import collide, collide_wall, touching_wall, wrap
 from .neighbour_list import (
     EDGES,
     PAIRS,
@@ -46,7 +41,7 @@ class Kicks(NamedTuple):
 
     velocity: np.ndarray  # (2n,) m/s, x and y in turn
     spin: np.ndarray  # (n,) rad/s
-    moving: np.ndarray  # (m, 2) who moves, as `moving` has it
+    moving: np.ndarray  # (m, 2) the disks that move, as `moving` has them
     strongest: float  # m: no disk moves by more in a step than it did in the one before
 
 
@@ -103,18 +98,14 @@ def take_quiet_steps(
 @kernel
 def is_quiet(disks: Disks, world: World, near: NeighbourList, p: int) -> bool:
     """Whether nothing collides in this step; p is the first near pair that touches."""
-    return holds(near) and p == near.found[PAIRS] and not touch_edges(disks, world, near)
-
-
-@kernel
-def touch_edges(disks: Disks, world: World, near: NeighbourList) -> bool:
-    """Whether any disk touches a wall, or the centre of one is beyond an edge of the box."""
+    if not holds(near) or p < near.found[PAIRS]:
+        return False
     if next_touching_wall(disks, world, near, 0) < near.found[WALLS]:
-        return True
+        return False
     for e in range(near.found[EDGES]):
         if outside(disks.position, near.edge[e], world):
-            return True
-    return False
+            return False
+    return True
 
 
 @compiled
@@ -134,7 +125,7 @@ def kicks_of(disks: Disks, world: World, dt: float) -> Kicks:
 
 
 @compiled
-def moving(mass):  # type: ignore[no-untyped-def]
+def moving(mass):
     """(m, 2): the disks from .. to .., at most a `BLOCK`, without the static ones."""
     runs, count = np.zeros((len(mass), 2), np.uint32), 0
     for i in range(len(mass)):
@@ -265,23 +256,17 @@ def collide_from(disks: Disks, world: World, k: int, collisions: list, i: int, j
                 collisions.append((k, a, b, impulse))
 
 
-@compiled
-def collide_walls(disks: Disks, world: World, k: int, collisions: list) -> None:
-    """Every disk against every wall, in order, as `exercise.step` does."""
-    for i in range(len(disks.radius)):
-        for w in range(len(world.walls)):
-            impulse = collide_wall(disks, i, w, world)
-            if impulse != 0.0:
-                collisions.append((k, i, -1 - w, impulse))
-
-
 @inlined
 def collide_near_walls(
     disks: Disks, world: World, dt: float, near: NeighbourList, k: int, collisions: list
 ) -> None:
     """Collide the disks that are near a wall, in order; all, where the list does not hold."""
     if not holds(near):
-        collide_walls(disks, world, k, collisions)
+        for i in range(len(disks.radius)):
+            for w in range(len(world.walls)):
+                impulse = collide_wall(disks, i, w, world)
+                if impulse != 0.0:
+                    collisions.append((k, i, -1 - w, impulse))
         return
     b = next_touching_wall(disks, world, near, 0)
     while b < near.found[WALLS]:
@@ -329,7 +314,7 @@ def wrap_near(disks: Disks, world: World, near: NeighbourList) -> None:
 
 
 @kernel
-def outside(x, i: int, world: World) -> bool:  # type: ignore[no-untyped-def]
+def outside(x, i: int, world: World) -> bool:
     """Whether the centre of disk `i` is beyond an edge of the box."""
     return (
         x[i, 0] < world.low[0]

@@ -30,17 +30,17 @@ from .meetings import (
     INDEXED,
     LEEWAY,
     NOBODY,
-    ask_all,
-    change,
     contact,
     empty_agenda,
-    first_due,
-    first_of_all,
+    first_meeting,
+    first_of_all_pairs,
+    list_meetings,
+    mark_changed,
     path_of,
+    way_in_step,
 )
 from .neighbour_list import (
     PAIRS,
-    ROUNDING,
     SLACK,
     STRIDE,
     WALLS,
@@ -60,7 +60,7 @@ MOST = 8  # collisions a disk and step, on average
 # reach, in radii.
 ALONE, LAST = 1, 5
 REACH = 0.0, 0.0, 2.0**-30, 2.0**-16, 2.0**-2, inf
-TURNS = 6  # of `press` a contact, at most
+TURNS = 6  # of `solve_pushes` a contact, at most
 TOGETHER = -1.0  # in place of an impulse: perhaps others touch these two
 
 
@@ -71,7 +71,7 @@ class Accelerations(NamedTuple):
     now: np.ndarray  # (n, 2) m/s2, and by what holds those at rest until the end of a step
     turning: np.ndarray  # (n,) rad/s2
     held: np.ndarray  # (n,) what holds the disk in this step, as an index of `LEEWAY`
-    moving: np.ndarray  # (m, 2) who moves, as `moving` has it
+    moving: np.ndarray  # (m, 2) the disks that move, as `moving` has them
     strongest: float  # m/s2, of the steady ones
 
 
@@ -80,7 +80,7 @@ def advance(disks: Disks, world: World, dt: float, count: int) -> list:
     """Advance `count` steps of `dt` s; return the collisions as (step, i, j, impulse in N s), wall
     w as j = -1 - w."""
     collisions = [(0, 0, 0, 0.0) for _ in range(0)]  # empty, but numba must know what it will hold
-    pressed = [(0, 0, 0, 0.0) for _ in range(0)]  # (i, j, row of the collision, force in N)
+    pushed = [(0, 0, 0, 0.0) for _ in range(0)]  # (i, j, row of the collision, force in N)
     acceleration, k = accelerations_of(disks, world), 0
     near = empty_list(disks.radius, len(world.walls))
     agenda = empty_agenda(near)
@@ -91,7 +91,7 @@ def advance(disks: Disks, world: World, dt: float, count: int) -> list:
         if used_up(near):
             find_near(disks, world, acceleration, near, agenda, -dt, dt, count - k)
         if agenda.length[DUE] > 0 or not holds(near):
-            resolve(disks, world, acceleration, near, agenda, dt, k, count, collisions, pressed)
+            resolve(disks, world, acceleration, near, agenda, dt, k, count, collisions, pushed)
         k += 1
     if world.friction == 0.0:
         turn(disks, acceleration, dt, count)
@@ -100,7 +100,6 @@ def advance(disks: Disks, world: World, dt: float, count: int) -> list:
 
 @compiled
 def accelerations_of(disks: Disks, world: World) -> Accelerations:
-    """By force, torque and gravity."""
     steady, turning = np.zeros_like(disks.velocity), np.zeros_like(disks.angle)
     strongest2 = 0.0
     for i in range(len(disks.mass)):
@@ -116,7 +115,7 @@ def accelerations_of(disks: Disks, world: World) -> Accelerations:
 
 
 @kernel
-def fly_until_meeting(  # type: ignore[no-untyped-def]
+def fly_until_meeting(
     disks: Disks, world: World, acceleration, near: NeighbourList, agenda, dt, k: int, count: int
 ) -> int:
     """Take steps from step k on until one in which two meet or the list is used up: in that one all
@@ -129,7 +128,7 @@ def fly_until_meeting(  # type: ignore[no-untyped-def]
         take_step(near, acceleration.strongest * dt * dt)
         if used_up(near):
             break
-        ask_all(disks, world, acceleration, near, agenda, -dt)
+        list_meetings(disks, world, acceleration, near, agenda, -dt)
         if agenda.length[DUE] > 0:
             break
         k += 1
@@ -170,16 +169,16 @@ def turn(disks: Disks, acceleration: Accelerations, dt: float, count: int) -> No
 
 
 @inlined
-def resolve(  # type: ignore[no-untyped-def]
-    disks, world, acceleration, near, agenda, dt: float, k: int, count: int, collisions, pressed
+def resolve(
+    disks, world, acceleration, near, agenda, dt: float, k: int, count: int, collisions, pushed
 ) -> None:
     """Meeting after meeting of a step in which all have flown to its end."""
     most, held, any_held, now = MOST * len(disks.radius), acceleration.held, False, -dt
     for c in range(most + 1):
         if holds(near):
-            first = first_due(disks, world, acceleration, near, agenda, now, dt)
+            first = first_meeting(disks, world, acceleration, near, agenda, now, dt)
         else:
-            first = first_of_all(disks, world, acceleration, near, now)
+            first = first_of_all_pairs(disks, world, acceleration, near, now)
         now, i, j = first
         alone = near.found[PAIRS] + near.found[WALLS] == 1
         if i == NOBODY or (c == most and (alone or world.restitution == 1.0)):
@@ -206,56 +205,47 @@ def resolve(  # type: ignore[no-untyped-def]
                     dt,
                     k,
                     collisions,
-                    pressed,
+                    pushed,
                 )
             if impulse > 0.0:
-                if len(pressed) > 0:
+                if len(pushed) > 0:
                     release(
-                        disks, world, acceleration, near, agenda, i, j, now, dt, collisions, pressed
+                        disks, world, acceleration, near, agenda, i, j, now, dt, collisions, pushed
                     )
                 collisions.append((k, i, j, impulse))
                 if hold > 0.0 and not alone:
-                    pressed.append((i, j, len(collisions) - 1, hold))
+                    pushed.append((i, j, len(collisions) - 1, hold))
                     held[i], held[max(i, j)] = max(held[i], ALONE), max(held[max(i, j)], ALONE)
-            change(disks, near, agenda, i, way_of(disks, acceleration.now, i, dt))
+            mark_changed(disks, acceleration, near, agenda, i, dt)
             if j >= 0:
-                change(disks, near, agenda, j, way_of(disks, acceleration.now, j, dt))
+                mark_changed(disks, acceleration, near, agenda, j, dt)
         if not holds(near):
             find_near(disks, world, acceleration, near, agenda, now, dt, count - k)
     if any_held:
         held[:] = 0
-        pressed.clear()
+        pushed.clear()
 
 
 @compiled
-def find_near(  # type: ignore[no-untyped-def]
-    disks: Disks, world: World, acceleration, near, agenda, now: float, dt: float, left: int
+def find_near(
+    disks: Disks, world: World, acceleration, near, agenda, now: float, dt: float, steps: int
 ) -> None:
     """Build the list at the end of a step, and put down all meetings from `now` on: in the step,
     each may have been a step away from its end."""
     longest = 0.0
     for i in range(len(disks.mass)):
         if disks.mass[i] != inf:
-            longest = max(longest, way_of(disks, acceleration.now, i, dt))
+            longest = max(longest, way_in_step(disks, acceleration.now, i, dt))
     near.length[STRIDE] = longest
-    build_list(near, disks.position, disks.radius, world, left)
+    build_list(near, disks.position, disks.radius, world, steps)
     near.length[SLACK] -= longest
     agenda.length[INDEXED] = 0
     if holds(near):
-        ask_all(disks, world, acceleration, near, agenda, now)
-
-
-@kernel
-def way_of(disks: Disks, acceleration, i: int, dt: float) -> float:  # type: ignore[no-untyped-def]
-    """m: disk i gets no farther in a step."""
-    x, v, a = disks.position, disks.velocity, acceleration
-    speed = sqrt(v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1])
-    strength = sqrt(a[i, 0] * a[i, 0] + a[i, 1] * a[i, 1])
-    return (speed + strength * abs(dt)) * abs(dt) + ROUNDING * max(abs(x[i, 0]), abs(x[i, 1]))
+        list_meetings(disks, world, acceleration, near, agenda, now)
 
 
 @compiled
-def move(x, remainder, i: int, axis: int, way: float) -> None:  # type: ignore[no-untyped-def]
+def move(x, remainder, i: int, axis: int, way: float) -> None:
     """Move disk i as `fly` does, and keep what rounding cuts off."""
     before, way = x[i, axis], way + remainder[i, axis]
     x[i, axis] = before + way
@@ -263,17 +253,17 @@ def move(x, remainder, i: int, axis: int, way: float) -> None:  # type: ignore[n
 
 
 @kernel
-def weights(mass, i: int, j: int) -> tuple[float, float]:  # type: ignore[no-untyped-def]
+def weights(mass, i: int, j: int) -> tuple[float, float]:
     """1/kg of the two; a wall's is 0."""
     return 1.0 / mass[i], 1.0 / mass[j] if j >= 0 else 0.0
 
 
 @compiled
-def lift(path, s: float, nx: float, ny: float) -> float:  # type: ignore[no-untyped-def]
+def opening_acceleration(path, s: float, nx: float, ny: float) -> float:
     """m/s2 at which the gap opens at s as one slides past the other: v2 / distance, and nothing
     along a wall's face.
 
-    Two that touch and slide past each other part, however hard they are pressed together, if that
+    Two that touch and slide past each other part, however hard they are pushed together, if that
     is more.
     """
     x, y, u, v, a, b, along, up, _ = path
@@ -291,7 +281,7 @@ def lift(path, s: float, nx: float, ny: float) -> float:  # type: ignore[no-unty
 
 
 @compiled
-def collide(  # type: ignore[no-untyped-def]
+def collide(
     disks: Disks, world: World, acceleration, i: int, j: int, s: float, dt, low: float, alone: bool
 ) -> tuple[float, float]:
     """The impulse J = -(1 + e) (vi - vj).n / (1/mi + 1/mj) at s, and both on their new ways to the
@@ -300,7 +290,10 @@ def collide(  # type: ignore[no-untyped-def]
     e, hold, path = world.restitution, 0.0, path_of(disks, world, acceleration, i, j)
     wi, wj = weights(disks.mass, i, j)
     _, rate, nx, ny = contact(path, s)
-    speed, inward = max(-rate, 0.0), -(path[4] * nx + path[5] * ny) - lift(path, s, nx, ny)
+    speed, inward = (
+        max(-rate, 0.0),
+        -(path[4] * nx + path[5] * ny) - opening_acceleration(path, s, nx, ny),
+    )
     # it would be back at once, and ever sooner: it rests, and is held
     rests = 2.0 * e * speed < inward * dt * REST
     if not alone and (rests or 2.0 * e * speed < low):
@@ -308,33 +301,35 @@ def collide(  # type: ignore[no-untyped-def]
     if rests:
         e, hold = 0.0, inward / (wi + wj)
     J = (1.0 + e) * speed / (wi + wj)
-    push_apart(disks, acceleration, i, j, nx, ny, J, hold, s)
+    apply_push(disks, acceleration, i, j, nx, ny, J, hold, s)
     if world.friction > 0.0:
-        rub(disks, acceleration, i, j, path, nx, ny, world.friction * J, world.friction * hold, s)
+        apply_friction(
+            disks, acceleration, i, j, path, nx, ny, world.friction * J, world.friction * hold, s
+        )
     return J - hold * s, hold
 
 
 @compiled
-def release(  # type: ignore[no-untyped-def]
-    disks, world, acceleration, near, agenda, i, j, s: float, dt, collisions, pressed
+def release(
+    disks, world, acceleration, near, agenda, i, j, s: float, dt, collisions, pushed
 ) -> None:
     """From s on, no force holds a contact of disk i or j that a collision has opened."""
-    for p in range(len(pressed)):
-        a, b, row, hold = pressed[p]
+    for p in range(len(pushed)):
+        a, b, row, hold = pushed[p]
         if hold > 0.0 and (a in (i, j) or b in (i, j)):
             _, rate, nx, ny = contact(path_of(disks, world, acceleration.now, a, b), s)
             if rate > COARSE * acceleration.strongest * dt:
-                push_apart(disks, acceleration.now, a, b, nx, ny, 0.0, -hold, s)
+                apply_push(disks, acceleration.now, a, b, nx, ny, 0.0, -hold, s)
                 k, _, _, impulse = collisions[row]
                 collisions[row] = (k, a, b, impulse + hold * s)
-                pressed[p] = (a, b, row, 0.0)
+                pushed[p] = (a, b, row, 0.0)
                 for d in (a, max(a, b)):
-                    change(disks, near, agenda, d, way_of(disks, acceleration.now, d, dt))
+                    mark_changed(disks, acceleration, near, agenda, d, dt)
 
 
 @compiled
-def settle(  # type: ignore[no-untyped-def]
-    disks, world, acceleration, near, agenda, first, level: int, dt: float, k, collisions, pressed
+def settle(
+    disks, world, acceleration, near, agenda, first, level: int, dt: float, k, collisions, pushed
 ) -> tuple[float, float]:
     """All that touch the two that meet first, and each other, at once: the impulses without bounce
     and then the forces, all >= 0, with which no gap of theirs closes before the end of the step.
@@ -345,53 +340,55 @@ def settle(  # type: ignore[no-untyped-def]
     """
     s, e, strongest = first[0], world.restitution, acceleration.strongest
     slow = strongest * dt * REST / (2.0 * e) if e > 0.0 and level < LAST else inf
-    who = touching(disks, world, acceleration.now, near, first, REACH[level], slow)
-    m = len(who)
+    contacts = touching(disks, world, acceleration.now, near, first, REACH[level], slow)
+    m = len(contacts)
     if m < 2:
         return collide(disks, world, acceleration.now, first[1], first[2], s, dt, 0.0, True)
     place, push = np.full(m, -1), np.zeros((2, m))  # impulses in N s, forces in N
     for c in range(m):
-        for p in range(len(pressed)):
-            if pressed[p][0] == who[c][0] and pressed[p][1] == who[c][1]:
-                place[c], push[1, c] = p, pressed[p][3]
-    start, left = push[1].copy(), min(LEEWAY[level], COARSE)
-    push_together(disks, world, acceleration, who, push, left, s, dt)
+        for p in range(len(pushed)):
+            if pushed[p][0] == contacts[c][0] and pushed[p][1] == contacts[c][1]:
+                place[c], push[1, c] = p, pushed[p][3]
+    start, tolerance = push[1].copy(), min(LEEWAY[level], COARSE)
+    push_contacts(disks, world, acceleration, contacts, push, tolerance, s, dt)
     if world.friction > 0.0:
         for c in range(m):
-            i, j = who[c]
+            i, j = contacts[c]
             path = path_of(disks, world, acceleration.now, i, j)
             _, _, nx, ny = contact(path, s)
             most, rise = world.friction * push[0, c], max(push[1, c] - start[c], 0.0)
-            rub(disks, acceleration.now, i, j, path, nx, ny, most, world.friction * rise, s)
-        push_together(disks, world, acceleration, who, push, left, s, dt)
+            apply_friction(
+                disks, acceleration.now, i, j, path, nx, ny, most, world.friction * rise, s
+            )
+        push_contacts(disks, world, acceleration, contacts, push, tolerance, s, dt)
     for c in range(m):
-        i, j = who[c]
+        i, j = contacts[c]
         p, hold, impulse = int(place[c]), push[1, c], push[0, c] - (push[1, c] - start[c]) * s
         if p >= 0:
-            row = pressed[p][2]
+            row = pushed[p][2]
             collisions[row] = (k, i, j, collisions[row][3] + impulse)
-            pressed[p] = (i, j, row, hold)
+            pushed[p] = (i, j, row, hold)
         elif impulse > 0.0:
-            pressed.append((i, j, len(collisions), hold))
+            pushed.append((i, j, len(collisions), hold))
             collisions.append((k, i, j, impulse))
         for d in (i, max(i, j)):
             if disks.mass[d] != inf:
                 acceleration.held[d] = level
-                change(disks, near, agenda, d, way_of(disks, acceleration.now, d, dt))
+                mark_changed(disks, acceleration, near, agenda, d, dt)
     return TOGETHER, 0.0
 
 
 @compiled
-def touching(disks, world, acceleration, near, first, reach: float, slow: float) -> list:  # type: ignore[no-untyped-def]
+def touching(disks, world, acceleration, near, first, reach: float, slow: float) -> list:
     """The contacts (i, j) that join the two that meet first and all that touch them in turn: closer
     than `reach` radii, and closing by less than `slow` m/s."""
-    mass, pairs, s, who = disks.mass, near.found[PAIRS], first[0], [(0, 0) for _ in range(0)]
+    mass, pairs, s, contacts = disks.mass, near.found[PAIRS], first[0], [(0, 0) for _ in range(0)]
     joined, taken = np.zeros(len(mass), np.bool_), np.zeros(pairs + near.found[WALLS], np.bool_)
     count = -1
     for d in (first[1], max(first[1], first[2])):
         joined[d] = mass[d] != inf
-    while count != len(who) and holds(near):
-        count = len(who)
+    while count != len(contacts) and holds(near):
+        count = len(contacts)
         for p in range(len(taken)):
             i = np.int64(near.first[p] if p < pairs else near.disk[p - pairs])
             j = np.int64(near.second[p]) if p < pairs else -1 - np.int64(near.wall[p - pairs])
@@ -401,42 +398,46 @@ def touching(disks, world, acceleration, near, first, reach: float, slow: float)
             gap, rate, _, _ = contact(path, s)
             if gap < reach * path[8] and -rate < slow:
                 taken[p] = True
-                who.append((int(i), int(j)))
+                contacts.append((int(i), int(j)))
                 for d in (i, max(i, j)):
                     joined[d] = mass[d] != inf
-    return who
+    return contacts
 
 
 @compiled
-def push_together(disks, world, acceleration, who, push, left: float, s: float, dt: float) -> None:  # type: ignore[no-untyped-def]
+def push_contacts(
+    disks, world, acceleration, contacts, push, tolerance: float, s: float, dt: float
+) -> None:
     """Change the impulses push[0] and then the forces push[1] (m,) of these contacts, from s on."""
-    m, h = len(who), max(-s, EXACT * dt)
+    m, h = len(contacts), max(-s, EXACT * dt)
     normal, weight, open = np.empty((m, 2)), np.empty((m, 2)), np.empty(m)
     for held in range(2):  # by an impulse, by a force
         for c in range(m):
-            i, j = who[c]
+            i, j = contacts[c]
             path = path_of(disks, world, acceleration.now, i, j)
             gap, rate, nx, ny = contact(path, s)
             open[c] = rate + max(gap, 0.0) / h
             if held:
                 straight = path[4] * nx + path[5] * ny
-                open[c] = 2.0 * open[c] / h + straight + lift(path, s, nx, ny)
+                open[c] = 2.0 * open[c] / h + straight + opening_acceleration(path, s, nx, ny)
             normal[c, 0], normal[c, 1] = nx, ny
             weight[c, 0], weight[c, 1] = weights(disks.mass, i, j)
         before, scale = push[held].copy(), acceleration.strongest * (1.0 if held else h)
         bodies = len(disks.mass) + len(world.walls)
-        press(who, weight, normal, open, push[held], bodies, left, scale)
+        solve_pushes(contacts, weight, normal, open, push[held], bodies, tolerance, scale)
         for c in range(m):
-            i, j = who[c]
+            i, j = contacts[c]
             change, nx, ny = push[held, c] - before[c], normal[c, 0], normal[c, 1]
             J, hold = (0.0, change) if held else (change, 0.0)
-            push_apart(disks, acceleration.now, i, j, nx, ny, J, hold, s)
+            apply_push(disks, acceleration.now, i, j, nx, ny, J, hold, s)
 
 
 @compiled
-def press(who, weight, normal, open, push, bodies: int, left: float, scale: float) -> None:  # type: ignore[no-untyped-def]
+def solve_pushes(
+    contacts, weight, normal, open, push, bodies: int, tolerance: float, scale: float
+) -> None:
     """Change the pushes (m,) >= 0 of the contacts along their normals until `open` (m,), how fast
-    each opens, is 0 where a contact pushes and >= 0 elsewhere: but for what is `left` of the scale.
+    each opens, is 0 where a contact pushes and >= 0 elsewhere, to `tolerance` of the scale.
 
     It is the minimum of a quadratic function over push >= 0 (the dual of Gauss's least constraint),
     found by conjugate gradients over those that push (Polyak, USSR Comput. Math. 9, 94, 1969): in a
@@ -451,7 +452,7 @@ def press(who, weight, normal, open, push, bodies: int, left: float, scale: floa
         for c in range(m):
             square += open[c] * open[c] if pushes[c] else 0.0
             closing += open[c] * open[c] if open[c] < 0.0 and not pushes[c] else 0.0
-        if max(square, closing) <= left * left * scale * scale:
+        if max(square, closing) <= tolerance * tolerance * scale * scale:
             break
         join = closing > square
         if join:
@@ -460,7 +461,7 @@ def press(who, weight, normal, open, push, bodies: int, left: float, scale: floa
         for c in range(m):
             pushes[c] = pushes[c] or (join and open[c] < 0.0)
             along[c] = share * along[c] - open[c] if pushes[c] else 0.0
-        respond(who, weight, normal, along, way, effect)
+        compute_effect(contacts, weight, normal, along, way, effect)
         for c in range(m):
             curvature += along[c] * effect[c]
         length, last, stops = square / curvature, square, -1
@@ -475,23 +476,23 @@ def press(who, weight, normal, open, push, bodies: int, left: float, scale: floa
 
 
 @compiled
-def respond(who, weight, normal, push, way, effect) -> None:  # type: ignore[no-untyped-def]
+def compute_effect(contacts, weight, normal, push, way, effect) -> None:
     """What pushes (m,) change in how fast each contact opens: effect (m,). Wall w, which never
     moves, is row -1 - w of `way`, so counts from its end."""
     way[:] = 0.0
     for c in range(len(push)):
-        i, j = who[c]
+        i, j = contacts[c]
         for axis in range(2):
             way[i, axis] += weight[c, 0] * push[c] * normal[c, axis]
             way[j, axis] -= weight[c, 1] * push[c] * normal[c, axis]
     for c in range(len(push)):
-        i, j = who[c]
+        i, j = contacts[c]
         x, y = way[i, 0] - way[j, 0], way[i, 1] - way[j, 1]
         effect[c] = normal[c, 0] * x + normal[c, 1] * y
 
 
 @compiled
-def push_apart(  # type: ignore[no-untyped-def]
+def apply_push(
     disks, acceleration, i: int, j: int, nx: float, ny: float, J: float, hold: float, s: float
 ) -> None:
     """From s on, as if the two had left with the impulse J and the force `hold` along n."""
@@ -507,7 +508,7 @@ def push_apart(  # type: ignore[no-untyped-def]
 
 
 @compiled
-def rub(  # type: ignore[no-untyped-def]
+def apply_friction(
     disks, acceleration, i: int, j: int, path, nx, ny, most: float, most_held: float, s: float
 ) -> None:
     """Coulomb's friction from s on: at most the impulse `most` at once, then at most the force
@@ -548,7 +549,7 @@ def rub(  # type: ignore[no-untyped-def]
 
 
 @compiled
-def carry_over(x, world: World, i: int) -> None:  # type: ignore[no-untyped-def]
+def carry_over(x, world: World, i: int) -> None:
     """A centre that is set onto the opposite edge as it leaves and flies on ends a box away."""
     for axis in range(2):
         if x[i, axis] < world.low[axis]:

@@ -44,7 +44,7 @@ class World(NamedTuple):
     friction: float = 0.0  # Coulomb's coefficient; only `coulomb` and `ordered` know it
 
 
-def make_disks(  # type: ignore[no-untyped-def]
+def make_disks(
     position, velocity, radius, mass, inertia=None, angle=None, angular_velocity=None
 ) -> Disks:
     """Disks from copies of the given arrays; no force, no torque; solid disks (m r2 / 2) where no

@@ -9,16 +9,13 @@ def main() -> None:
     from crosscheck2d.adapters.safe_path import keep_path_safe
 
     keep_path_safe()  # before anything else is imported
-    from crosscheck2d.reports.terminal.exits import ends_on_signals, refuse
-    from crosscheck2d.reports.terminal.streams import printing
+    from crosscheck2d.reports.terminal.exits import ends_on_signals, printing, refuse
 
     with ends_on_signals(), printing():
         if sys.flags.optimize > 1:
             refuse(
-                [
-                    "PYTHONOPTIMIZE=2, or python -OO, takes away the docstrings that metrics are"
-                    " explained by; unset it"
-                ]
+                "PYTHONOPTIMIZE=2, or python -OO, takes away the docstrings that metrics are"
+                " explained by; unset it"
             )
         # which takes a second: what is raised while it is imported may be lost
         from crosscheck2d.reports.cli import app

@@ -33,11 +33,12 @@ def place(text: str) -> Path:
     """A path as it was given; exits 2 for an empty one, which `Path` takes for the current
     folder."""
     if not text:
-        refuse(['"": is not there; name a file or a folder'])
+        refuse('"": is not there; name a file or a folder')
     return Path(text)
 
 
 path_option = partial(Option, metavar="PATH", parser=place)
+path_argument = partial(Argument, parser=place)
 AsJson = Annotated[bool, Option("--json", help="Print JSON.")]
 Scenes = Annotated[
     list[str] | None,
@@ -192,7 +193,7 @@ def report(
     They are made from what was played; no scene is played again. With --timings the engines are
     timed again.
     """
-    from crosscheck2d.reports.commands.report import report_again
+    from crosscheck2d.reports.commands.run import report_again
 
     report_again(out, timings)
 
@@ -241,9 +242,8 @@ def truth(
 def check(
     path: Annotated[
         Path,
-        Argument(
+        path_argument(
             metavar="FILE|DIR",
-            parser=place,
             help="An Exercise.js, a solver.py, or a folder of them, one for each student.",
         ),
     ],
@@ -350,8 +350,7 @@ def check(
 @app.command()
 def play(
     flight: Annotated[
-        Path | None,
-        Argument(metavar="FLIGHT.toml", parser=place, help="A saved flight to fly again."),
+        Path | None, path_argument(metavar="FLIGHT.toml", help="A saved flight to fly again.")
     ] = None,
     engine: Engines = None,
     port: Port = 8000,
@@ -519,15 +518,13 @@ def tune(
 def new_engine(
     name: Annotated[
         Path,
-        typer.Argument(
-            metavar="NAME",
-            parser=place,
-            help="The file to write: NAME.js in JavaScript, NAME.py in Python.",
+        path_argument(
+            metavar="NAME", help="The file to write: NAME.js in JavaScript, NAME.py in Python."
         ),
     ],
     source: Annotated[
         Path | None,
-        typer.Option(
+        Option(
             "--from",
             metavar="FILE",
             parser=place,
@@ -536,54 +533,49 @@ def new_engine(
     ] = None,
     fields: Annotated[
         str | None,
-        typer.Option(
+        Option(
             metavar="NAMES",
             help='Of a ball: x, y, vx, vy, radius, mass, as "x y dx dy r m" or "pos.x ...".',
         ),
     ] = None,
     move: Annotated[
         str | None,
-        typer.Option(
+        Option(
             metavar="CALL",
             help="Moves a ball: NAME, .METHOD or a call with ball, dt, width, height.",
         ),
     ] = None,
     collide: Annotated[
         str | None,
-        typer.Option(
-            metavar="CALL", help="Collides two balls: NAME, .METHOD or a call with a and b."
-        ),
+        Option(metavar="CALL", help="Collides two balls: NAME, .METHOD or a call with a and b."),
     ] = None,
     step: Annotated[
         str | None,
-        typer.Option(metavar="CALL", help="Moves and collides all balls: NAME or a call with dt."),
+        Option(metavar="CALL", help="Moves and collides all balls: NAME or a call with dt."),
     ] = None,
     ball: Annotated[
         str | None,
-        typer.Option(
+        Option(
             metavar="EXPRESSION", help='Makes a ball from x, y, vx, vy, r, m: "new Ball(x, y, r)".'
         ),
     ] = None,
     balls: Annotated[
-        str | None, typer.Option(metavar="NAME", help="The list of all balls, if --step uses one.")
+        str | None, Option(metavar="NAME", help="The list of all balls, if --step uses one.")
     ] = None,
     box: Annotated[
-        str | None,
-        typer.Option(metavar="NAMES", help='Width and height of its box: "canvas.width H".'),
+        str | None, Option(metavar="NAMES", help='Width and height of its box: "canvas.width H".')
     ] = None,
     gravity: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Its gravity, positive if down.")
+        str | None, Option(metavar="NAME", help="Its gravity, positive if down.")
     ] = None,
     restitution: Annotated[
-        str | None,
-        typer.Option(metavar="NAME|NUMBER", help="Its restitution. Default: 1."),
+        str | None, Option(metavar="NAME|NUMBER", help="Its restitution. Default: 1.")
     ] = None,
     per_frame: Annotated[
-        float | None,
-        typer.Option(metavar="N", help="Its speeds are per frame, with N frames a second."),
+        float | None, Option(metavar="N", help="Its speeds are per frame, with N frames a second.")
     ] = None,
-    pixels: Annotated[float | None, typer.Option(metavar="N", help="Its pixels in 1 m.")] = None,
-    y_down: Annotated[bool, typer.Option("--y-down", help="Its y points down.")] = False,
+    pixels: Annotated[float | None, Option(metavar="N", help="Its pixels in 1 m.")] = None,
+    y_down: Annotated[bool, Option("--y-down", help="Its y points down.")] = False,
 ) -> None:
     """Write an engine to begin with, in a file of your own.
 
@@ -601,8 +593,7 @@ def new_engine(
 @app.command(name="new-solver")
 def new_solver(
     name: Annotated[
-        Path,
-        Argument(metavar="NAME", parser=place, help="The file to write: Exercise.js or solver.py."),
+        Path, path_argument(metavar="NAME", help="The file to write: Exercise.js or solver.py.")
     ],
 ) -> None:
     """Write the two functions of the exercise, to be filled in."""

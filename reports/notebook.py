@@ -18,7 +18,7 @@ import numpy as np
 import pandas as pd
 
 from crosscheck2d.adapters.engines import ENGINES, row_of
-from crosscheck2d.adapters.run import Run, unplayed_run
+from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.check.verdict import check_file
 from crosscheck2d.reports.compare.against import TRUTH
 from crosscheck2d.reports.compare.comparison import Comparison, compare
@@ -56,8 +56,6 @@ class ShownRuns(pd.DataFrame):
 
 
 class ShownScene(Scenario):
-    """A scenario that draws its start."""
-
     def _repr_html_(self) -> str:
         return framed(self.name, [kit.Section("", self.asks, [start_of(self)])])
 
@@ -198,15 +196,13 @@ def raising() -> Iterator[None]:
 
 
 def as_run(ended: Run | Failure, name: str, substeps: int, scenario: Scenario) -> Run:
-    """The run of a cell, though its process has failed."""
     if isinstance(ended, Run):
         return ended
-    lost = unplayed_run(name, scenario, scenario.dt(substeps))
+    lost = Run.unplayed(name, scenario, scenario.dt(substeps))
     return replace(lost, status=ended.status, reason=ended.reason)
 
 
 def framed(title: str, sections: Sequence[kit.Section]) -> str:
-    """A page of its own within a notebook, as high as it is."""
     page = kit.Page(title, sections, "crosscheck2d", names=[*ENGINES, style.TRUTH], footer=" ")
     return (
         f'<iframe srcdoc="{escape(kit.render_page(page))}" onload="{HEIGHT}"'
@@ -215,7 +211,6 @@ def framed(title: str, sections: Sequence[kit.Section]) -> str:
 
 
 def replay_of(scenario: Scenario, layers: list[tuple[Run | None, Trajectory]]) -> kit.Playback:
-    """What was played, the exact answer on top."""
     return kit.Playback(pack_layers(scenario, layers), ratio_of(scenario, layers))
 
 

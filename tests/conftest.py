@@ -15,8 +15,7 @@ from playwright.sync_api import Browser
 
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.reports.run import pool, timing_pass
-from tests.compiling import LOCKS, compiling_alone
-from tests.forks import start_worker
+from tests.forks import LOCKS, compiling_alone, start_worker
 from tests.reports.page.browsing import chromium
 
 # Images of containers forbid Python to keep what it has compiled. Each process of the tests would
@@ -48,7 +47,6 @@ def pytest_xdist_auto_num_workers() -> Generator[None, int, int]:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Keep what there is before the marks select some of it."""
     config.stash[COLLECTED] = [*items]
 
 
@@ -65,13 +63,11 @@ def pytest_sessionfinish() -> None:
 
 @pytest.fixture(scope="session")
 def collected(pytestconfig: pytest.Config) -> list[pytest.Item]:
-    """All tests of what was asked for, of whatever marks."""
     return pytestconfig.stash[COLLECTED]
 
 
 @pytest.fixture(autouse=True, scope="session")
 def compiled_once(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Here and in what is forked, see `compiling`."""
     with pytest.MonkeyPatch.context() as patch:
         locks = tmp_path_factory.getbasetemp().parent  # common to all processes
         patch.setenv(LOCKS, str(locks))
@@ -102,7 +98,6 @@ def same_engines() -> Iterator[None]:
 
 @pytest.fixture
 def fresh_workers(monkeypatch: pytest.MonkeyPatch) -> None:
-    """For what is said of the workers themselves: each as users have it."""
     monkeypatch.setattr(pool, "start_process", START_PROCESS)
 
 

@@ -1,5 +1,6 @@
 """Processes that are forked from one in which everything is imported: a start takes 0.05 s of work,
-not some three.
+not some three; and what one process of the tests compiles, the others wait for and load: without it
+they compile the same kernels side by side, a sixth of the work of the fast suite.
 
 For tests in which it makes no difference how a process has started.
 """
@@ -15,7 +16,11 @@ from functools import cache
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from pathlib import Path
+from typing import Any
 from unittest import mock
+
+from filelock import FileLock
+from numba.core.dispatcher import Dispatcher
 
 from crosscheck2d.reports.run import pool
 
@@ -32,6 +37,7 @@ LOADED = [
     "crosscheck2d.reports.lessons.command",
     "crosscheck2d.reports.tune.command",
 ]
+LOCKS = "CROSSCHECK_COMPILE_LOCKS"  # variable that says where the locks are to who is forked, too
 # multiprocessing polls all of its processes whenever it starts one; what one thread has read,
 # another waits for.
 LOCK = threading.Lock()
@@ -80,13 +86,24 @@ def crosscheck_in(
 
 
 def start_worker(connection: Connection, folder: str, memory: int) -> BaseProcess:
-    """A worker in a fork, in place of `pool.start_process`."""
     line = Connection(os.dup(connection.fileno()))
     return start(serve, line, folder, memory, dict(os.environ))
 
 
 def serve(connection: Connection, folder: str, memory: int, environment: Mapping[str, str]) -> None:
-    """In the fork: the worker, with the variables of the test."""
     os.environ.clear()
     os.environ |= environment
     pool.serve(connection, folder, memory, False)
+
+
+def compiling_alone(locks: Path) -> Callable[[Dispatcher, Any], Any]:
+    """What takes the place of `Dispatcher.compile`, so that no other process with the same folder
+    of locks compiles a function meanwhile."""
+    compile_here = Dispatcher.compile
+
+    def compile_alone(self: Dispatcher, signature: Any) -> Any:
+        name = f"{self.py_func.__module__}.{self.py_func.__qualname__}"
+        with FileLock(locks / f"{name}.lock", is_singleton=True):
+            return compile_here(self, signature)
+
+    return compile_alone

@@ -16,7 +16,7 @@ from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.adapters.play import play
 from crosscheck2d.reports.compare.comparison import compare
 from crosscheck2d.scenarios.catalogue import scenario
-from tests.compiling import LOCKS, compiling_alone
+from tests.forks import LOCKS, compiling_alone
 
 if LOCKS in os.environ:
     Dispatcher.compile = compiling_alone(Path(os.environ[LOCKS]))

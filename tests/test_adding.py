@@ -113,14 +113,13 @@ ADDED: dict[str, list[Added]] = {
     "a metric": [
         Added(
             "reports/compare/metrics.py",
-            "def toy_metric(view: View) -> Value | None:\n"
-            '    """42, whatever was played."""\n    return Value(42.0)\n\n\n',
-            "METRICS: dict",
+            "def toy_metric(view: View) -> Value | None:\n    return Value(42.0)\n\n\n",
+            "BESIDE = ",
         ),
         Added(
             "reports/compare/metrics.py",
-            '    "toy_metric": Metric(toy_metric, "1", (ITSELF,)),\n',
-            '    "position_max_radii"',
+            '    Metric(toy_metric, "1", (ITSELF,), "", "42, whatever was played."),\n',
+            "    Metric(\n        position_max_radii,",
         ),
     ],
     "a lesson": [
@@ -179,7 +178,6 @@ def grown(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def python(grown: Path, *words: str | Path) -> str:
-    """What Python prints that finds the copy first, run in an empty folder beside it."""
     path = os.pathsep.join(map(str, (grown.parent, grown)))  # the package, and the tests
     environment = os.environ | {"PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1"}
     done = subprocess.run(
@@ -195,7 +193,6 @@ def python(grown: Path, *words: str | Path) -> str:
 
 
 def test_the_table_of_contributing_names_what_is_added_here_and_where():
-    """A row each, and every file of it is one that an addition is written to."""
     text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
     rows = {
         what: set(re.findall(r"`((?:adapters|reports|scenarios)/[^`]*)`", rest))
@@ -209,14 +206,12 @@ def test_the_table_of_contributing_names_what_is_added_here_and_where():
 
 
 def test_the_command_after_an_engine_is_the_one_that_is_run_here():
-    """As CONTRIBUTING.md and the README of the adapters have it."""
     for page in ("CONTRIBUTING.md", "adapters/README.md"):
         text = (ROOT / page).read_text(encoding="utf-8")
         assert "uv run python -m crosscheck2d.adapters.conformance.impact_table NAME" in text, page
 
 
 def test_nothing_of_it_is_in_the_source_itself():
-    """Negative control: what is looked for below comes from what was added."""
     assert [
         path
         for folder in SOURCE
@@ -227,8 +222,6 @@ def test_nothing_of_it_is_in_the_source_itself():
 
 @pytest.mark.slow
 def test_all_that_is_added_is_known_everywhere(grown: Path):
-    """Tables, colour, version, option, variant, error budget and lesson; and nothing else has
-    changed its look."""
     code = """
 import json
 import runpy
@@ -243,7 +236,7 @@ from crosscheck2d.reports.lessons.pages import lesson_page
 from crosscheck2d.reports.page.style import PALETTE, look, mark_of_file
 from crosscheck2d.reports.run.cells import versions
 from crosscheck2d.reports.speed.budget import budget_of
-from crosscheck2d.reports.stability.variants import DRIVEN_ENGINES
+from crosscheck2d.reports.stability.limits import DRIVEN_ENGINES
 from crosscheck2d.scenarios.catalogue import SCENARIOS
 found = conform("toy:plain", ENGINES["toy:plain"])
 sys.argv[1:] = ["toy"]
@@ -284,7 +277,6 @@ print(json.dumps({
 
 @pytest.mark.slow
 def test_a_run_has_them_in_its_tables_and_on_its_page(grown: Path):
-    """One cell: the toy engine on the toy scene, with probes, metric, version and colour."""
     words = (
         "run",
         "toy_scene",
@@ -328,7 +320,6 @@ def test_a_run_has_them_in_its_tables_and_on_its_page(grown: Path):
 def test_speed_and_stability_have_the_engine_on_their_pages(
     grown: Path, command: str, names: list[str]
 ):
-    """In the tables, and with its colour."""
     python(
         grown, "-m", "crosscheck2d.reports", command, *names, "--engine", "toy", "--out", command
     )
@@ -339,7 +330,6 @@ def test_speed_and_stability_have_the_engine_on_their_pages(
 
 
 def test_an_engine_is_named_in_its_files_and_its_row_and_else_only_in_texts_about_it():
-    """The youngest engine, for all: what holds for it holds for the next one."""
     # which engines a lesson shows
     about_it = {"reports/lessons/mechanisms/substeps.py", "reports/lessons/thrust.py"}
     about_it |= {f"reports/lessons/friction/{name}.py" for name in ("bounce", "cone", "rolling")}

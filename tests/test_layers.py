@@ -44,10 +44,10 @@ LAYERS = {
     "adapters": [
         "matched safe_path system",
         "engine",
-        "advance engine_row first_collisions float32 friction library_versions run runaway",
+        "advance engine_row float32 friction library_versions run",
         "play",
-        f"{' '.join({name.partition(':')[0] for name in ENGINES})} npm_packages",
-        "library_at_version",
+        f"{' '.join({name.partition(':')[0] for name in ENGINES})} library_at_version",
+        "npm_packages",
         "host",
         "engines",
         "mechanisms conformance snippets",
@@ -102,7 +102,6 @@ def of_folder(folder: str, names: Iterable[str]) -> set[str]:
 
 
 def test_a_file_imports_only_from_layers_below():
-    """An engine never sees the judge, the solver never sees the harness."""
     upwards = []
     for path in FILES:
         ours = {name.split(".")[0] for name in imports_of(path)} & set(MAY_IMPORT)
@@ -114,7 +113,6 @@ def test_a_file_imports_only_from_layers_below():
 
 @pytest.mark.parametrize("folder", LAYERS)
 def test_inside_a_folder_imports_point_down(folder: str):
-    """Between the parts of a folder, files and folders alike."""
     height = {part: k for k, line in enumerate(LAYERS[folder]) for part in line.split()}
     upwards = []
     for name, path in MODULES.items():
@@ -127,7 +125,6 @@ def test_inside_a_folder_imports_point_down(folder: str):
 
 
 def test_imports_are_absolute_but_in_the_solvers_which_can_be_copied_alone():
-    """The solvers name each other and numpy and numba, never the package that they are in."""
     for path in FILES:
         own = path.relative_to(ROOT).parts[0] == "reference_impl"
         for node in ast.walk(ast.parse(path.read_text())):
@@ -138,7 +135,6 @@ def test_imports_are_absolute_but_in_the_solvers_which_can_be_copied_alone():
 
 
 def loaded_twice(modules: Iterable[ModuleType]) -> dict[Path, set[str]]:
-    """Files of this repository that are loaded under several names."""
     names: dict[Path, set[str]] = {}
     for module in modules:
         file = getattr(module, "__file__", None)
@@ -148,8 +144,8 @@ def loaded_twice(modules: Iterable[ModuleType]) -> dict[Path, set[str]]:
 
 
 def test_no_file_is_loaded_under_two_names():
-    """As `crosscheck2d.reports` and as `reports`: a class would then be two classes. All that the
-    tests import is loaded here; the control loads a file under its old name."""
+    # As `crosscheck2d.reports` and as `reports`: a class would then be two classes. All that the
+    # tests import is loaded here; the control loads a file under its old name.
     assert loaded_twice([*sys.modules.values()]) == {}
     assert not {*MAY_IMPORT} & {name.partition(".")[0] for name in sys.modules}
     old = ".".join(("adapters", "matched"))
@@ -160,7 +156,6 @@ def test_no_file_is_loaded_under_two_names():
 
 
 def test_no_application_imports_another():
-    """But lessons may ask stability for a limit."""
     both = [
         f"{path.relative_to(ROOT)} imports {other}"
         for name, path in MODULES.items()
@@ -173,7 +168,6 @@ def test_no_application_imports_another():
 
 
 def test_no_file_imports_itself_through_others():
-    """No circle anywhere, imports inside functions included."""
     graph = {name: imports_of(path) & set(MODULES) - {name} for name, path in MODULES.items()}
     while leaves := [name for name, others in graph.items() if not others]:
         graph = {name: others - set(leaves) for name, others in graph.items() if name not in leaves}
@@ -182,7 +176,6 @@ def test_no_file_imports_itself_through_others():
 
 
 def test_what_compares_opens_no_file_starts_no_process_and_asks_no_clock():
-    """`reports/compare` is pure: trajectories in, tables out."""
     unclean = {
         "os",
         "io",
@@ -205,7 +198,6 @@ def test_what_compares_opens_no_file_starts_no_process_and_asks_no_clock():
 
 
 def test_only_the_engine_table_names_engines():
-    """An engine's library is imported by its own adapter and nowhere else."""
     libraries = {"pymunk", "Box2D", "pyb2d3"}
     users = {
         str(path.relative_to(ROOT)): {name.split(".")[0] for name in imports_of(path)} & libraries
@@ -220,7 +212,6 @@ def test_only_the_engine_table_names_engines():
 
 
 def test_no_two_classes_have_one_name():
-    """One name stands for one idea, wherever it is imported."""
     names = Counter(
         node.name
         for path in FILES

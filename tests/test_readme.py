@@ -30,7 +30,6 @@ TEXT = TEXTS["README.md"]
 
 
 def blocks_of(text: str) -> list[tuple[str, str]]:
-    """(language, text) of every block of code."""
     return re.findall(r"^```(\w+)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
 
 
@@ -99,7 +98,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_first_block_is_the_two_commands():
-    """They set up and run everything; the gate runs them as they are written."""
     kind, block = blocks_of(TEXT)[0]
 
     assert kind == "sh"
@@ -108,7 +106,6 @@ def test_the_first_block_is_the_two_commands():
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_command_of_a_readme_succeeds(command: str, folder: Path):
-    """Every line of a shell block, run in order in one folder, exits with 0."""
     words = shlex.split(command, comments=True)
 
     assert words[:2] == ["uv", "run"]
@@ -124,7 +121,6 @@ def test_a_command_of_a_readme_succeeds(command: str, folder: Path):
 
 @pytest.mark.slow
 def test_the_three_commands_for_many_machines_play_a_run(tmp_path: Path):
-    """Scheduler and worker are started as they are written, but for the address: this machine."""
     pytest.importorskip("distributed")
     scheduler, worker, run = (shlex.split(line)[4:] for line in CLUSTER)
     words = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard"]
@@ -167,7 +163,6 @@ def test_the_three_commands_for_many_machines_play_a_run(tmp_path: Path):
 def test_the_python_blocks_run_on_the_scene_beside_them(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    """They use the package alone; what they end with is a table of numbers; the disks do meet."""
     monkeypatch.chdir(folder)
     blocks = [
         block for text in TEXTS.values() for kind, block in blocks_of(text) if kind == "python"
@@ -185,7 +180,6 @@ def test_the_python_blocks_run_on_the_scene_beside_them(
 
 
 def test_the_readme_counts_as_the_tables_do():
-    """Scenes, probes and lessons are as many as it says."""
     patterns = {
         "scenes": r"(\d+) scenes through",
         "probes": r"answers (\d+) probes",
@@ -201,7 +195,6 @@ def test_the_readme_counts_as_the_tables_do():
 
 
 def test_the_readme_counts_the_solvers_of_the_confusion_table():
-    """As many faulty and correct ones as the catalogue has, and the table a row for each."""
     said = re.search(
         r"what `check` says of (\d+) solvers with one or two faults and of (\d+) without",
         TEXTS["reports/check/README.md"],
@@ -216,8 +209,6 @@ def test_the_readme_counts_the_solvers_of_the_confusion_table():
 
 @pytest.mark.parametrize("document", TEXTS)
 def test_every_file_that_a_document_names_exists(document: str):
-    """Links, and paths in backquotes that look like files of the repository or of the document's
-    own folder."""
     folder = (ROOT / document).parent
     links = re.findall(r"\]\((?!https?:)([^)#]+)\)", TEXTS[document])
     named = set(
@@ -238,7 +229,6 @@ def test_every_file_that_a_document_names_exists(document: str):
 
 
 def test_the_functions_of_a_score_are_in_the_files_that_architecture_names():
-    """A row of its table names files, and functions that one of them defines."""
     table = TEXTS["ARCHITECTURE.md"].partition("| where |")[2].partition("\n\n")[0]
     rows = [re.findall(r"`([\w/.]+)`", line) for line in table.splitlines()[2:]]
     missing = []
@@ -252,7 +242,6 @@ def test_the_functions_of_a_score_are_in_the_files_that_architecture_names():
 
 
 def test_the_front_page_is_short_and_leads_to_every_other():
-    """A page; each README is linked from it, from ARCHITECTURE.md, or from the folder above."""
     assert len(TEXT.splitlines()) <= 120
     linked = {
         (ROOT / document).parent.joinpath(path).resolve()
@@ -268,8 +257,8 @@ def test_the_front_page_is_short_and_leads_to_every_other():
 
 
 def test_every_file_of_the_source_is_named_where_its_folder_is_explained():
-    """In the README.md of its folder. A folder without one, whose files are all of one kind, is
-    itself named in the README.md of the folder above. The file of an engine has its name."""
+    # In the README.md of its folder. A folder without one, whose files are all of one kind, is
+    # itself named in the README.md of the folder above. The file of an engine has its name.
     files = {path for top in TOP[:-1] for path in (ROOT / top).rglob("*.py")}
     files -= {ROOT / "adapters" / f"{name.partition(':')[0]}.py" for name in ENGINES}
     missing = []
@@ -284,8 +273,6 @@ def test_every_file_of_the_source_is_named_where_its_folder_is_explained():
 
 
 def test_what_is_read_first_is_short():
-    """In half an hour: README, without a row for each engine, and the five files that the folders
-    say to start with."""
     first = (
         "README.md",
         "scenarios/model.py",

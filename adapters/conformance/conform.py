@@ -18,32 +18,21 @@ PROBES: dict[str, Probe] = CONTRACT | PHYSICS | LAWS
 
 @dataclass(frozen=True)
 class Finding:
-    """The result of one probe of one engine.
-
-    Attributes:
-        engine, profile: the row of `ENGINES`, `engine:profile`.
-        probe: a key of `PROBES`, or "make" for an engine that cannot be made.
-        asked: the question, one plain sentence.
-        got: the answer, a number in the unit of the question, or words.
-        expected: the answer of an engine that follows protocol and scene.
-        bound: how far a number may be from it.
-        verdict: "keeps"; "not asked": it refuses the scene of the question, and `note` says why;
-            "departs": it follows the protocol, but its physics differs from the scene; "breaks": no
-            number of this engine may be trusted.
-        note: the exception or refusal, or what limits the reading.
-        departure: the law that is broken, of `Departure`, if the probe tells; else "".
-    """
+    """The result of one probe of one engine."""
 
     engine: str
     profile: str
-    probe: str
-    asked: str
-    got: float | str
-    expected: float | str
-    bound: float
+    probe: str  # a key of `PROBES`, or "make" for an engine that cannot be made
+    asked: str  # the question, one plain sentence
+    got: float | str  # the answer, a number in the unit of the question, or words
+    expected: float | str  # the answer of an engine that follows protocol and scene
+    bound: float  # how far a number may be from it
+    # "keeps"; "not asked": it refuses the scene of the question, and `note` says why; "departs": it
+    # follows the protocol, but its physics differs from the scene; "breaks": no number of this
+    # engine may be trusted
     verdict: str
-    note: str = ""
-    departure: str = ""
+    note: str = ""  # the exception or refusal, or what limits the reading
+    departure: str = ""  # the law that is broken, of `Departure`, if the probe tells
 
 
 def conform(name: str, row: EngineRow) -> list[Finding]:
@@ -69,7 +58,6 @@ def conform(name: str, row: EngineRow) -> list[Finding]:
 def not_probed(
     name: str, what: str, why: str, verdict: Literal["breaks", "departs"] = "breaks"
 ) -> Finding:
-    """The one finding of an engine that could not be made, or did not survive its probes."""
     engine, profile = name.split(":")
     return Finding(
         engine,
@@ -85,7 +73,6 @@ def not_probed(
 
 
 def ask(engine: str, profile: str, name: str, row: EngineRow) -> Finding:
-    """The finding of one probe; raises `NotLoaded`."""
     probe = PROBES[name]
     try:
         reading = probe.read(row)
@@ -97,7 +84,7 @@ def ask(engine: str, profile: str, name: str, row: EngineRow) -> Finding:
     except Exception as error:  # an engine may raise anything; the finding records it
         reading, verdict = (
             ProbeReading("raised", "an answer", note=f"{type(error).__name__}: {error}"),
-            "departs" if row.exercise else missed(name, row) if is_own(row) else "breaks",
+            "departs" if row.exercise else missed(name, row) if row.source else "breaks",
         )
     return Finding(
         engine,
@@ -115,12 +102,5 @@ def ask(engine: str, profile: str, name: str, row: EngineRow) -> Finding:
 
 
 def missed(name: str, row: EngineRow) -> str:
-    """The verdict for an engine that fails a probe."""
-    probe = PROBES[name]
-    own_physics = name in row.departs or (probe.handed_on and is_own(row))
-    return "departs" if own_physics else probe.failure
-
-
-def is_own(row: EngineRow) -> bool:
-    """Whether it is a solver's own file, which gets the values of the scene from the harness."""
-    return bool(row.source)
+    probe, own_file = PROBES[name], bool(row.source)  # whose values come from the harness
+    return "departs" if name in row.departs or (probe.handed_on and own_file) else probe.failure

@@ -36,9 +36,9 @@ from crosscheck2d.adapters.conformance.probe import (
 )
 from crosscheck2d.adapters.engine import Unsupported
 from crosscheck2d.adapters.engine_row import FLOAT32, EngineRow
-from crosscheck2d.adapters.runaway import fault_of
+from crosscheck2d.adapters.run import fault_of
+from crosscheck2d.scenarios.model import Scene
 
-NONE = np.zeros(2)
 # a scale, an inverse mass, a product, a sum: the most roundings between a force and a velocity
 ROUNDINGS = 8
 
@@ -73,8 +73,6 @@ def order_and_shapes(row: EngineRow) -> ProbeReading:
 
 
 def read_copies(row: EngineRow) -> ProbeReading:
-    """A step does not change a state that was read, and editing that state does not change the
-    engine."""
     faults = set()
     with loaded(row, *simplified(plain())) as engine:
         early = engine.read()
@@ -93,8 +91,6 @@ def read_copies(row: EngineRow) -> ProbeReading:
 
 
 def load_forgets(row: EngineRow) -> ProbeReading:
-    """After `load`, an engine that has played a collision and has a pending force behaves like a
-    fresh one."""
     scenes = simplified(plain())
     with loaded(row, *simplified(replace(head_on(2.0), restitution=1.0))) as used:
         last = len(used.read().angle) - 1
@@ -117,7 +113,7 @@ def load_forgets(row: EngineRow) -> ProbeReading:
 
 
 def worlds_are_separate(row: EngineRow) -> ProbeReading:
-    """A second engine of the same kind, a hundred times as large, changes nothing in the first."""
+    # A second engine of the same kind, a hundred times as large, changes nothing in the first.
     large = scene_of(position=[[0.0, 0.0]], velocity=[[1.0, 0.0]], radius=[50.0], mass=[1.0])
     scenes = simplified(plain())
     with loaded(row, *scenes) as alone:
@@ -129,7 +125,6 @@ def worlds_are_separate(row: EngineRow) -> ProbeReading:
 
 
 def counts_are_steps(row: EngineRow) -> ProbeReading:
-    """step(3) is step() three times, to the bit."""
     scenes = simplified(plain())
     with loaded(row, *scenes) as one_by_one:
         for _ in range(60):
@@ -143,7 +138,7 @@ def counts_are_steps(row: EngineRow) -> ProbeReading:
 
 
 def steps_obey_dt(row: EngineRow) -> ProbeReading:
-    """v dt a step, for two dt; a position rounds once a step."""
+    # v dt a step, for two dt; a position rounds once a step.
     worst, steps, speed = 0.0, 64, 1.5
     for dt in (DT, 0.01):
         with loaded(row, one_disk(velocity=(speed, 0.0)), dt=dt) as engine:
@@ -154,7 +149,6 @@ def steps_obey_dt(row: EngineRow) -> ProbeReading:
 
 
 def stays_finite(row: EngineRow) -> ProbeReading:
-    """20 steps of a scene with a collision, a bounce, gravity and spin."""
     with loaded(row, *simplified(plain())) as engine:
         for k in range(20):
             engine.step()
@@ -164,8 +158,8 @@ def stays_finite(row: EngineRow) -> ProbeReading:
 
 
 def force_lasts_one_step(row: EngineRow) -> ProbeReading:
-    """One force, then one step, then three: the speed is the same after the first step and after
-    all."""
+    # One force, then one step, then three: the speed is the same after the first step and after
+    # all.
     force, torque = np.array([20.0, 10.0]), 3.0
     with loaded(row, one_disk()) as engine:
         try:
@@ -195,27 +189,23 @@ def force_lasts_one_step(row: EngineRow) -> ProbeReading:
     return ProbeReading(max(ratios, key=lambda ratio: abs(ratio - 1)), 1.0, 4 * row.rounding)
 
 
-def mass_by_force(row: EngineRow) -> ProbeReading:
-    """F dt / dv of a disk of 7.3 kg; by a density of 1 it would have 0.785 kg."""
+def inertia_seen(
+    row: EngineRow, expected: float, force: float = 0.0, torque: float = 0.0
+) -> ProbeReading:
+    """F dt / dv of a disk of 7.3 kg, which a density of 1 would give 0.785 kg; or torque dt / dw of
+    its 0.9 kg m2, where a solid disk of its mass would have 0.9125."""
     with loaded(row, one_disk()) as engine:
-        engine.apply_force(0, np.array([30.0, 0.0]), 0.0)
+        engine.apply_force(0, np.array([force, 0.0]), torque)
         engine.step()
-        dv = float(engine.read().velocity[0, 0])
-    return ProbeReading(30.0 * DT / dv if dv else np.inf, 7.3, ROUNDINGS * row.rounding * 7.3)
-
-
-def inertia_by_torque(row: EngineRow) -> ProbeReading:
-    """torque dt / dw of a disk of 0.9 kg m2; a solid disk of its mass would have 0.9125."""
-    with loaded(row, one_disk()) as engine:
-        engine.apply_force(0, NONE, 2.0)
-        engine.step()
-        dw = float(engine.read().angular_velocity[0])
-    return ProbeReading(2.0 * DT / dw if dw else np.inf, 0.9, ROUNDINGS * row.rounding * 0.9)
+        state = engine.read()
+    change = float(state.angular_velocity[0] if torque else state.velocity[0, 0])
+    seen = (force or torque) * DT / change if change else np.inf
+    return ProbeReading(seen, expected, ROUNDINGS * row.rounding * expected)
 
 
 def same_instant(row: EngineRow) -> ProbeReading:
-    """After 1 s of free fall the speed is g t; a velocity half a step off would differ by g dt / 2
-    = 0.02 m/s."""
+    # After 1 s of free fall the speed is g t; a velocity half a step off would differ by g dt / 2 =
+    # 0.02 m/s.
     steps, gravity = 256, 9.81
     with loaded(row, one_disk(gravity=gravity)) as engine:
         engine.step(steps)
@@ -223,29 +213,22 @@ def same_instant(row: EngineRow) -> ProbeReading:
     return ProbeReading(speed, gravity * steps * DT, row.rounding * steps * gravity)
 
 
-def collisions_are_reported(row: EngineRow) -> ProbeReading:
-    """One collision of disks 1 and 2 of three gives one collision, of these two."""
-    with loaded(row, head_on(2.0)) as engine:
-        engine.step(12)
-        return ProbeReading(reported(engine), "disk 1 and disk 2")
+BETWEEN_WALLS = scene_of(
+    position=[[0.0, 9.0], [0.0, 0.0]],
+    velocity=[[0.0, 0.0], [2.0, 0.0]],
+    radius=[0.5, 0.5],
+    mass=[1.0, 1.0],
+    walls=[[[-0.53, -2.0], [-0.53, 2.0]], [[0.53, -2.0], [0.53, 2.0]]],
+)
 
 
-def walls_are_reported(row: EngineRow) -> ProbeReading:
-    """One collision on the second of two walls gives one collision, with this wall."""
-    scene = scene_of(
-        position=[[0.0, 9.0], [0.0, 0.0]],
-        velocity=[[0.0, 0.0], [2.0, 0.0]],
-        radius=[0.5, 0.5],
-        mass=[1.0, 1.0],
-        walls=[[[-0.53, -2.0], [-0.53, 2.0]], [[0.53, -2.0], [0.53, 2.0]]],
-    )
+def collisions_are_reported(row: EngineRow, scene: Scene, expected: str) -> ProbeReading:
     with loaded(row, scene) as engine:
         engine.step(12)
-        return ProbeReading(reported(engine), "disk 1 and wall 1")
+        return ProbeReading(reported(engine), expected)
 
 
 def collisions_name_their_step(row: EngineRow) -> ProbeReading:
-    """The step of a collision, from 0, is the one in which the velocities change."""
     with loaded(row, head_on(2.0)) as engine:
         must_report(engine)
         before = engine.read().velocity[1, 0]
@@ -258,8 +241,7 @@ def collisions_name_their_step(row: EngineRow) -> ProbeReading:
 
 
 def impulse_is_reported(row: EngineRow) -> ProbeReading:
-    """The reported impulses add up to the momentum exchanged; an engine may also report none
-    (NaN)."""
+    # The reported impulses add up to the momentum exchanged; an engine may also report none (NaN).
     with loaded(row, head_on(2.0)) as engine:
         must_report(engine)
         before = engine.read().velocity[2, 0]
@@ -274,8 +256,8 @@ def impulse_is_reported(row: EngineRow) -> ProbeReading:
 
 
 def static_stays(row: EngineRow) -> ProbeReading:
-    """A static disk keeps its state to the bit under a collision and a force. The collision is
-    asked for if the engine reports any."""
+    # A static disk keeps its state to the bit under a collision and a force. The collision is asked
+    # for if the engine reports any.
     scene = scene_of(
         position=[[-1.02, 0.1], [0.0, 0.0]],
         velocity=[[2.0, 0.0], [0.0, 0.0]],
@@ -325,14 +307,20 @@ CONTRACT: dict[str, Probe] = {
         "How much faster is a disk 3 steps after a force than after its first step?",
         force_lasts_one_step,
     ),
-    "mass_by_force": _HandedOn("What mass does a force see? (kg)", mass_by_force),
-    "inertia_by_torque": _HandedOn("What inertia does a torque see? (kg m2)", inertia_by_torque),
+    "mass_by_force": _HandedOn(
+        "What mass does a force see? (kg)", partial(inertia_seen, expected=7.3, force=30.0)
+    ),
+    "inertia_by_torque": _HandedOn(
+        "What inertia does a torque see? (kg m2)", partial(inertia_seen, expected=0.9, torque=2.0)
+    ),
     "same_instant": _HandedOn("How fast is a disk after 1 s under 9.81 m/s2? (m/s)", same_instant),
     "collisions_are_reported": _HandedOn(
-        "Which collisions are reported when disks 1 and 2 meet once?", collisions_are_reported
+        "Which collisions are reported when disks 1 and 2 meet once?",
+        partial(collisions_are_reported, scene=head_on(2.0), expected="disk 1 and disk 2"),
     ),
     "walls_are_reported": _HandedOn(
-        "Which collisions are reported when disk 1 meets wall 1 once?", walls_are_reported
+        "Which collisions are reported when disk 1 meets wall 1 once?",
+        partial(collisions_are_reported, scene=BETWEEN_WALLS, expected="disk 1 and wall 1"),
     ),
     "collisions_name_their_step": _HandedOn(
         "In which step is a collision reported?", collisions_name_their_step

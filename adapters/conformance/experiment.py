@@ -37,7 +37,6 @@ def outcomes(velocity: Array, spin: Array) -> dict[str, Array]:
 
 
 def exact() -> dict[str, Array]:
-    """The quantities of the exact answer."""
     scenario = oblique_impacts(DT, LEAD)
     assert scenario.truth is not None
     end = scenario.truth(scenario.times[-1:]).at(0)
@@ -81,7 +80,6 @@ def rows_of(name: str, row: EngineRow, expected: Mapping[str, Array]) -> list[di
 
 
 def table_of(rows: Mapping[str, EngineRow]) -> pd.DataFrame:
-    """The rows of these engines, as `rows_of`."""
     expected = exact()
     return pd.DataFrame([cells for item in rows.items() for cells in rows_of(*item, expected)])
 
@@ -104,7 +102,6 @@ def in_markdown(table: pd.DataFrame) -> str:
 
 
 def text(quantity: str, value: float) -> str:
-    """A number in the digits that are measured."""
     return f"{value:.3f}" if quantity == "e_t" else f"{value:.0f}"
 
 

@@ -87,7 +87,6 @@ def velocities(engine: Engine) -> Array:
 
 
 def restitution(engine: Engine, dt: float, speed: float | Array = 2.0, scale: float = 1.0) -> Array:
-    """Separation over approach speed of each pair; NaN if they have not met."""
     states = collide(engine, pairs(speed, dt, scale=scale), dt)
     before, after = (state[1::2, 0] - state[::2, 0] for state in states)
     return np.where(after > 0.999 * before, -after / before, np.nan)
@@ -107,7 +106,6 @@ def threshold(engine: Engine, dt: float) -> Array:
 
 
 def wall_restitution(engine: Engine, dt: float) -> Array:
-    """Speed after over speed before a collision of 2 m/s on a wall."""
     at = np.stack([-2.0 * dt * (4 + PHASES), ROWS_APART], axis=1)
     scene = scene_of(
         position=np.vstack([at, FREE]),
@@ -184,13 +182,12 @@ def lever(engine: Engine, dt: float) -> Array:
 
 
 def divide(a: Array, b: Array) -> Array:
-    """a / b, and NaN where b is 0."""
     quotient: Array = np.divide(a, b, out=np.full(len(b), np.nan), where=b != 0)
     return quotient
 
 
 def fast_spin(engine: Engine, dt: float) -> Array:
-    """rad/s, of free disks that start with 300 rad/s, after 4 steps."""
+    # rad/s, of free disks that start with 300 rad/s, after 4 steps.
     scene = scene_of(
         position=np.stack([0 * ROWS_APART, ROWS_APART], axis=1),
         velocity=np.zeros((COUNT, 2)),
@@ -232,7 +229,6 @@ ROWS = ENGINES | FETCHED
 
 
 def rows_of_table(name: str, row: EngineRow) -> list[dict[str, float | str]]:
-    """The rows of one engine, one for each step size, with the date and its versions."""
     rows = list[dict[str, float | str]]()
     with closing(row.make()) as engine:
         for dt in STEP_SIZES:
@@ -250,7 +246,7 @@ def rows_of_table(name: str, row: EngineRow) -> list[dict[str, float | str]]:
 
 
 def read(column: ImpactColumn, engine: Engine, dt: float) -> Array:
-    """The readings of a column that are numbers; NaN if the engine refuses the scene."""
+    # The readings of a column that are numbers; NaN if the engine refuses the scene.
     try:
         numbers = column.read(engine, dt)
     except (Unsupported, Frictionless):
@@ -265,12 +261,10 @@ def table_of(rows: Mapping[str, EngineRow]) -> pd.DataFrame:
 
 
 def kept() -> pd.DataFrame:
-    """The table as it was last written."""
     return pd.read_csv(KEPT, keep_default_na=False, na_values=["", "nan"])
 
 
 def in_markdown(table: pd.DataFrame) -> str:
-    """The table in the form of README, followed by its date and versions."""
     headings = ["engine", "dt", *(column.heading for column in COLUMNS.values()), "numbers"]
     lines = [f"| {' | '.join(headings)} |", "|---" * len(headings) + "|"]
     for row in table.to_dict("records"):
@@ -283,7 +277,7 @@ def in_markdown(table: pd.DataFrame) -> str:
 
 
 def cell(column: str, *spread: float) -> str:
-    """The median in the digits of its column, and the range if that has others; "-" for none."""
+    # The median in the digits of its column, and the range if that has others; "-" for none.
     if np.isnan(spread[0]):
         return "-"
     form = {"energy": "{:+.1f}", "threshold": "{:.2g}"}.get(column, "{:.3g}")
@@ -293,14 +287,12 @@ def cell(column: str, *spread: float) -> str:
 
 
 def replace_table(text: str, mark: str, table: str) -> str:
-    """The text of adapters/README.md with this table between its marks."""
     begin, end = f"<!-- {mark} -->\n", f"<!-- end of {mark} -->"
     before, _, rest = text.partition(begin)
     return before + begin + table + end + rest.partition(end)[2]
 
 
 def with_anew(engines: Sequence[str]) -> pd.DataFrame:
-    """The table as it was last written, with new rows of these engines, in the order of `ROWS`."""
     anew = table_of({name: row for name, row in ROWS.items() if name.split(":")[0] in engines})
     was = kept()
     both = pd.concat([was[~was.engine.isin(anew.engine)], anew]).set_index("engine", drop=False)

@@ -51,7 +51,6 @@ class Impact(NamedTuple):
     ways: Sequence[tuple[Sequence[float], Sequence[float]]]
 
     def law(self, name: str) -> Departure:
-        """The law of this name for walls or for pairs."""
         return Departure["WALL_" * (len(self.masses) == 1) + name]
 
 
@@ -138,7 +137,7 @@ def scene_before(impact: Impact, way: int, boxed: bool, phase: float, e: float) 
 
 
 def turn(impact: Impact, phase: float) -> float:
-    """The sign of the impact's directions at a phase: a wall is never turned."""
+    # The sign of the impact's directions at a phase: a wall is never turned.
     return -1.0 if phase < 0 and len(impact.masses) > 1 else 1.0
 
 

@@ -58,28 +58,15 @@ def free_flight(row: EngineRow) -> ProbeReading:
     return ProbeReading(offset, min(laws, key=lambda law: abs(law - offset)), bound)
 
 
-def slow_flight(row: EngineRow) -> ProbeReading:
-    """Speed in m/s of a free disk after 2 s: nothing acts on it, so it is not even rounded."""
-    speed = 2.0**-8
-    with loaded(row, one_disk(velocity=(speed, 0.0))) as engine:
-        engine.step(512)
-        return ProbeReading(float(engine.read().velocity[0, 0]), speed, 2 * row.rounding * speed)
-
-
-def fast_flight(row: EngineRow) -> ProbeReading:
-    """Speed in m/s of a free disk after 4 steps of 1/64 s, 16 radii each."""
-    speed = 512.0
-    with loaded(row, one_disk(velocity=(speed, 0.0)), dt=1 / 64) as engine:
-        engine.step(4)
-        return ProbeReading(float(engine.read().velocity[0, 0]), speed, 2 * row.rounding * speed)
-
-
-def fast_spin(row: EngineRow) -> ProbeReading:
-    """Spin in rad/s of a free disk after 4 steps of 1/64 s, three quarters of a turn each."""
-    spin = 300.0
-    with loaded(row, one_disk(spin=spin), dt=1 / 64) as engine:
-        engine.step(4)
-        return ProbeReading(float(engine.read().angular_velocity[0]), spin, 2 * row.rounding * spin)
+def coasting(
+    row: EngineRow, steps: int, dt: float = DT, speed: float = 0.0, spin: float = 0.0
+) -> ProbeReading:
+    """Speed in m/s or spin in rad/s of a free disk: nothing acts on it, and it is not rounded."""
+    with loaded(row, one_disk((speed, 0.0), spin), dt=dt) as engine:
+        engine.step(steps)
+        state = engine.read()
+    got = float(state.angular_velocity[0] if spin else state.velocity[0, 0])
+    return ProbeReading(got, speed or spin, 2 * row.rounding * (speed or spin))
 
 
 def spins_freely(row: EngineRow) -> ProbeReading:
@@ -118,18 +105,12 @@ def pair_momentum(row: EngineRow) -> ProbeReading:
 
 
 def restitution(row: EngineRow, closing: float) -> ProbeReading:
-    """The restitution of two equal disks that meet head-on, e = 0.5."""
-    return ProbeReading(pair_restitution(row, head_on(closing)), 0.5, ROUNDINGS * row.rounding)
-
-
-def pair_restitution(row: EngineRow, scene: Scene) -> float:
-    """Separation over approach speed of the two disks of `head_on`."""
-    before, after = (state.velocity for state in collided(row, scene))
-    return float((after[2] - after[1])[0] / (before[1] - before[2])[0])
+    before, after = (state.velocity for state in collided(row, head_on(closing)))
+    e = float((after[2] - after[1])[0] / (before[1] - before[2])[0])
+    return ProbeReading(e, 0.5, ROUNDINGS * row.rounding)
 
 
 def wall_restitution(row: EngineRow) -> ProbeReading:
-    """Speed after over speed before a collision of 2 m/s on a wall, e = 0.5."""
     scene = scene_of(
         position=[[0.0, 0.0]],
         velocity=[[2.0, 0.0]],
@@ -145,8 +126,8 @@ def wall_restitution(row: EngineRow) -> ProbeReading:
 
 
 def friction(row: EngineRow) -> ProbeReading:
-    """The friction of a collision where none is stated: the sideways part is 0, and not even
-    rounded."""
+    # The friction of a collision where none is stated: the sideways part is 0, and not even
+    # rounded.
     return ProbeReading(sideways(row, head_on(2.0, spin=40.0)), 0.0, row.rounding)
 
 
@@ -173,7 +154,6 @@ def where_modelled(read: Callable[..., ProbeReading]) -> Callable[..., ProbeRead
 
 @where_modelled
 def friction_in_bounce(row: EngineRow, restitution: float) -> ProbeReading:
-    """The friction of a collision where some is stated."""
     scene = replace(head_on(2.0, spin=40.0), restitution=restitution, friction=FRICTION)
     return ProbeReading(sideways(row, scene), FRICTION, ROUNDINGS * row.rounding)
 
@@ -206,10 +186,17 @@ PHYSICS: dict[str, Probe] = {
     "free_flight": _Physics(
         "How far is a thrown disk from the parabola after 1 s? (m)", free_flight
     ),
-    "slow_flight": _Physics("How fast is a free disk of 3.9 mm/s after 2 s? (m/s)", slow_flight),
-    "fast_flight": _Physics("How fast is a free disk of 512 m/s after 4 steps? (m/s)", fast_flight),
+    "slow_flight": _Physics(
+        "How fast is a free disk of 3.9 mm/s after 2 s? (m/s)",
+        partial(coasting, steps=512, speed=2.0**-8),
+    ),
+    "fast_flight": _Physics(
+        "How fast is a free disk of 512 m/s after 4 steps? (m/s)",  # 16 radii each
+        partial(coasting, steps=4, dt=1 / 64, speed=512.0),
+    ),
     "fast_spin": _Physics(
-        "How fast does a free disk of 300 rad/s spin after 4 steps? (rad/s)", fast_spin
+        "How fast does a free disk of 300 rad/s spin after 4 steps? (rad/s)",
+        partial(coasting, steps=4, dt=1 / 64, spin=300.0),  # three quarters of a turn each
     ),
     "spins_freely": _Physics(
         "What angle has a free disk after 1 s at 20 rad/s? (rad)", spins_freely

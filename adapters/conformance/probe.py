@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from crosscheck2d.adapters.engine import SILENT, Engine, Unsupported
 from crosscheck2d.adapters.engine_row import EngineRow
-from crosscheck2d.adapters.first_collisions import first_collisions
+from crosscheck2d.adapters.run import first_collisions
 from crosscheck2d.scenarios.model import Array, Scene, State, frozen
 
 EXERCISE = 0.9  # the restitution that the exercise states
@@ -42,7 +42,7 @@ class ProbeReading(NamedTuple):
 
     @property
     def kept(self) -> bool:
-        """Whether it is as expected; NaN never is."""
+        # Whether it is as expected; NaN never is.
         if isinstance(self.got, str) or isinstance(self.expected, str):
             return self.got == self.expected
         return abs(self.got - self.expected) <= self.bound
@@ -50,21 +50,17 @@ class ProbeReading(NamedTuple):
 
 @dataclass(frozen=True)
 class Probe:
-    """One question to every engine.
+    """One question to every engine."""
 
-    Attributes:
-        asked: the question, one plain sentence.
-        read: makes fresh engines from a row of `ENGINES` and closes them again.
-        failure: "breaks" if a miss means that the adapter breaks the protocol, so that no number of
-            the engine may be trusted; "departs" if it means other physics than the scene states.
-        handed_on: it reads values that an adapter passes to its library (mass, forces, dt) or from
-            it (collisions, numbers that are none). A solver's own file gets these from the harness,
-            so a failure is due to its physics, and departs.
-    """
-
-    asked: str
+    asked: str  # the question, one plain sentence
+    # makes fresh engines from a row of `ENGINES` and closes them again
     read: Callable[[EngineRow], ProbeReading]
+    # "breaks" if a miss means that the adapter breaks the protocol, so that no number of the engine
+    # may be trusted; "departs" if it means other physics than the scene states
     failure: Literal["breaks", "departs"]
+    # it reads values that an adapter passes to its library (mass, forces, dt) or from it
+    # (collisions, numbers that are none). A solver's own file gets these from the harness, so a
+    # failure is due to its physics, and departs.
     handed_on: bool = False
 
 
@@ -78,7 +74,6 @@ def loaded(row: EngineRow, *scenes: Scene, dt: float = DT) -> Iterator[Engine]:
 
 
 def collided(row: EngineRow, *scenes: Scene) -> tuple[State, State]:
-    """The states before and after 24 steps of a scene, as `loaded`, whose disks meet in them."""
     with loaded(row, *scenes) as engine:
         before = engine.read()
         engine.step(24)
@@ -113,14 +108,12 @@ def simplified(scene: Scene) -> tuple[Scene, ...]:
 
 
 def without_spin_and_gravity(scene: Scene) -> tuple[Scene, ...]:
-    """`scene`, then without spin, without gravity, without both."""
     still: dict[str, Any] = {"angular_velocity": np.zeros(scene.n)}
     light: dict[str, Any] = {"gravity": np.zeros(2)}
     return scene, replace(scene, **still), replace(scene, **light), replace(scene, **still, **light)
 
 
 def scene_of(restitution: float = 0.5, **arrays: ArrayLike) -> Scene:
-    """A scene from plain lists, by the names of its fields."""
     fields: dict[str, Any] = {name: frozen(values) for name, values in arrays.items()}
     return Scene(restitution=restitution, **fields)
 
@@ -128,7 +121,6 @@ def scene_of(restitution: float = 0.5, **arrays: ArrayLike) -> Scene:
 def one_disk(
     velocity: tuple[float, float] = (0.0, 0.0), spin: float = 0.0, gravity: float = 0.0
 ) -> Scene:
-    """A single disk, with a mass and an inertia that no default density or solid disk gives."""
     return scene_of(
         position=[[0.25, -0.5]],
         velocity=[velocity],
@@ -180,13 +172,11 @@ def reported(engine: Engine, dt: float = DT) -> str:
 
 
 def must_report(engine: Engine) -> None:
-    """Raise `Unsupported` for an engine whose settings say that it reports no collisions."""
     if is_silent(engine):
         raise Unsupported("it reports no collisions")
 
 
 def is_silent(engine: Engine) -> bool:
-    """Whether the engine's settings say that it reports no collisions."""
     return bool(engine.settings().get("collisions", (None, None))[1] == SILENT)
 
 
@@ -219,10 +209,8 @@ def history(engine: Engine, steps: int = 60) -> list[tuple[str, bytes]]:
 
 
 def first_difference(seen: list[tuple[str, bytes]], wanted: list[tuple[str, bytes]]) -> str:
-    """The first difference of two histories, or "nowhere"."""
     return next((what for (what, a), (_, b) in zip(seen, wanted) if a != b), "nowhere")
 
 
 def largest(array: Array) -> float:
-    """Largest magnitude in an array."""
     return float(np.abs(array).max())

@@ -28,7 +28,6 @@ OPTIONS: dict[str, Any] = {
 
 
 def kernel(function: Kernel) -> Kernel:
-    """The compiled function."""
     return njit(**OPTIONS)(function)
 
 

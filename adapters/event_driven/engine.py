@@ -21,7 +21,6 @@ class EventDriven:
     listening, wrapping = True, 0.0
 
     def load(self, scene: Scene, dt: float) -> None:
-        """Predict the first event of every disk; refuses a start without a single continuation."""
         try:
             self.engine = EventEngine(scene)
             self.engine.advance(0.0)
@@ -33,7 +32,6 @@ class EventDriven:
         self.forced: set[int] = set()
 
     def apply_force(self, disk: int, force: Array, torque: float) -> None:
-        """Add a force and a torque on a disk during the next step; a static disk ignores them."""
         if not self.scene.static[disk]:
             self.force[disk] += force
             self.torque[disk] += torque
@@ -61,7 +59,6 @@ class EventDriven:
             self.engine.accelerate(disk, self.steps * self.dt, acceleration[disk], turning[disk])
 
     def advance(self, count: int) -> None:
-        """Carry out the events of `count` steps."""
         self.steps += count
         try:
             self.engine.advance(self.steps * self.dt)
@@ -80,13 +77,12 @@ class EventDriven:
         return self.angle + (self.spin + turning * since / 2) * since, self.spin + turning * since
 
     def read(self) -> State:
-        """The state of every disk, moved from its last event to now."""
         now = self.steps * self.dt
         turned = self.engine.rotation_at(now) if self.scene.friction else self.rotation()
         return State(*self.engine.motion_at(now), *turned)
 
     def collisions(self) -> list[ContactImpulse]:
-        """All collisions, each in the step that contains its time."""
+        # All collisions, each in the step that contains its time.
         found = []
         for t, i, j, impulse in self.engine.collisions.tolist():
             step = int(t / self.dt)
@@ -96,14 +92,12 @@ class EventDriven:
         return found
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
-        """The engine has no settings."""
         return {
             "contact times": (None, "roots of the gap"),
             "a force within a step": (None, "constant acceleration"),
         }
 
     def versions(self) -> dict[str, str]:
-        """The versions that decide the last bit: numba compiles the engine."""
         return {"numba": version("numba"), "numpy": version("numpy")}
 
     def close(self) -> None:

@@ -36,9 +36,9 @@ from crosscheck2d.adapters.event_driven.disks import (
     Rules,
     Scenery,
     Walls,
+    empty_queue,
 )
-from crosscheck2d.adapters.event_driven.friction import rotation_at
-from crosscheck2d.adapters.event_driven.queue import empty_queue
+from crosscheck2d.adapters.event_driven.impacts import rotation_at
 from crosscheck2d.scenarios.model import Array, Scene
 from crosscheck2d.scenarios.no_truth import NoTruth
 
@@ -105,7 +105,9 @@ class EventEngine:
             counters[LEFT] = EVENTS
             status = event_loop.advance(self.arena, self.scenery, until)
             self.spent += EVENTS - int(counters[LEFT])
-            self.empty_log()
+            if counters[LOGGED]:
+                self.kept.append(self.arena.log[: counters[LOGGED]].copy())
+                counters[LOGGED] = 0
             if self.spent >= MOST:
                 self.refuse_too_many(until)
         at, i, j = (
@@ -161,13 +163,6 @@ class EventEngine:
         disks, walls = (sorted(j for j in found if j >= 0), sorted(-1 - j for j in found if j < 0))
         return " and ".join([*(f"disk {j}" for j in disks), *(f"wall {w}" for w in walls)])
 
-    def empty_log(self) -> None:
-        """Move the rows of the log to `kept`."""
-        counters = self.arena.counters
-        if counters[LOGGED]:
-            self.kept.append(self.arena.log[: counters[LOGGED]].copy())
-            counters[LOGGED] = 0
-
     def accelerate(self, disk: int, at: float, acceleration: Array, rate: float = 0.0) -> None:
         """Set the acceleration (2,) m/s2 of a disk that is not static, and its angular acceleration
         `rate` rad/s2, used with friction only; from `at` s on, which `advance` has reached."""
@@ -198,35 +193,31 @@ class EventEngine:
     def refuse_pairs(self) -> None:
         """Raise `NoTruth` if two disks overlap, or touch and approach; decided in rationals,
         because float64 cannot decide it."""
-        disks, found = self.arena.disks, np.empty((8 * self.scene.n, 2), np.int64)
-        count = event_loop.near_pairs(disks, self.arena.head, self.arena.grid, WIDER - 1, found)
-        for i, j in found[:count]:
-            refuse_pair(disks[i], disks[j], self.arena.grid, int(i), int(j))
-
-
-def refuse_pair(a: Any, b: Any, grid: Grid, i: int, j: int) -> None:
-    """Raise `NoTruth` if disks i and j overlap, or touch and approach."""
-    apart = [Fraction(b.x) - Fraction(a.x), Fraction(b.y) - Fraction(a.y)]
-    if grid.torus:
-        apart = [
-            d - Fraction(span) * round(d / Fraction(span)) for d, span in zip(apart, grid.span)
-        ]
-    reach = Fraction(a.radius) + Fraction(b.radius)
-    gap = sum(d * d for d in apart) - reach * reach
-    closing = apart[0] * (Fraction(b.vx) - Fraction(a.vx)) + apart[1] * (
-        Fraction(b.vy) - Fraction(a.vy)
-    )
-    if gap < 0:
-        overlap = -float(gap) / (float(reach) + np.hypot(float(apart[0]), float(apart[1])))
-        raise NoTruth(
-            f"disks {i} and {j} overlap by {overlap:.3g} m at the start: move one {overlap:.3g} m"
-            " away"
-        )
-    if gap == 0 and closing < 0:
-        speed = -float(closing) / float(reach)
-        raise NoTruth(
-            f"disks {i} and {j} touch and approach at {speed:.3g} m/s at the start: leave a gap"
-        )
+        disks, grid = self.arena.disks, self.arena.grid
+        near = np.empty((8 * self.scene.n, 2), np.int64)
+        count = event_loop.near_pairs(disks, self.arena.head, grid, WIDER - 1, near)
+        for i, j in near[:count]:
+            a, b = disks[i], disks[j]
+            apart = [Fraction(b.x) - Fraction(a.x), Fraction(b.y) - Fraction(a.y)]
+            if grid.torus:
+                apart = [d - Fraction(s) * round(d / Fraction(s)) for d, s in zip(apart, grid.span)]
+            reach = Fraction(a.radius) + Fraction(b.radius)
+            gap = sum(d * d for d in apart) - reach * reach
+            closing = apart[0] * (Fraction(b.vx) - Fraction(a.vx)) + apart[1] * (
+                Fraction(b.vy) - Fraction(a.vy)
+            )
+            if gap < 0:
+                overlap = -float(gap) / (float(reach) + np.hypot(float(apart[0]), float(apart[1])))
+                raise NoTruth(
+                    f"disks {i} and {j} overlap by {overlap:.3g} m at the start: move one"
+                    f" {overlap:.3g} m away"
+                )
+            if gap == 0 and closing < 0:
+                speed = -float(closing) / float(reach)
+                raise NoTruth(
+                    f"disks {i} and {j} touch and approach at {speed:.3g} m/s at the start: leave"
+                    " a gap"
+                )
 
 
 def refuse_walls(scene: Scene) -> bool:
@@ -289,7 +280,6 @@ def refuse_box(scene: Scene, torus: Array | None) -> None:
 
 
 def rules_of(scene: Scene, leaning: bool) -> Rules:
-    """The scene's physics as the kernels take it; leaning: a disk touches a wall at the start."""
     falling, walled = bool(scene.gravity.any()), len(scene.walls) > 0
     # A disk that rests on a wall does not fall with the others; at e = 1 only a disk that touches a
     # wall at the start can rest.
@@ -313,16 +303,26 @@ def rules_of(scene: Scene, leaning: bool) -> Rules:
 
 
 def walls_of(scene: Scene, grid: Grid, low: Array) -> Walls:
-    """The wrap box and the walls, as the kernels take them."""
+    side = np.array(grid.side)
+    centre = low + side * (
+        np.stack(np.meshgrid(*map(np.arange, grid.shape), indexing="ij"), -1).reshape(-1, 2) + 0.5
+    )
+    reach = (
+        np.hypot(*side) / 2 + scene.radius.max()
+    ) * WIDER  # of a disk anywhere in the cell of a centre
+    near = np.zeros((len(centre), len(scene.walls)), bool)
+    for w, (start, end) in enumerate(scene.walls):
+        along = end - start
+        share = np.clip((centre - start) @ along / (along @ along), 0, 1)
+        near[:, w] = np.hypot(*(centre - start - share[:, None] * along).T) <= reach
     along = scene.walls[:, 1] - scene.walls[:, 0]
     length = np.hypot(*along.T) if len(along) else np.zeros(0)
-    segment = np.column_stack([scene.walls[:, 0], along / length[:, None], length])
-    wrap = np.zeros((2, 2)) if scene.wrap is None else np.array(scene.wrap)
     return Walls(
-        wrap,
-        segment,
-        surfaces(scene.walls),
-        *walls_by_cell(scene, low, np.array(grid.side), np.array(grid.shape)),
+        wrap=np.zeros((2, 2)) if scene.wrap is None else np.array(scene.wrap),
+        segment=np.column_stack([scene.walls[:, 0], along / length[:, None], length]),
+        surface=surfaces(scene.walls),
+        first=np.append(0, near.sum(axis=1).cumsum()).astype(np.int64),
+        of=np.nonzero(near)[1].astype(np.int64),
     )
 
 
@@ -378,8 +378,6 @@ def line_of(wall: list[list[float]]) -> tuple[Line, int]:
 
 
 def grid_of(scene: Scene, torus: Array | None, cell: float) -> tuple[Grid, Array]:
-    """The cell grid and its low corner: over the torus, or over all disks and walls with a margin
-    of one cell."""
     least = max(2 * scene.radius.max() * WIDER, cell)
     corners = np.empty((0, 2)) if scene.wrap is None else scene.wrap
     points = np.concatenate([scene.position, scene.walls.reshape(-1, 2), corners])
@@ -399,31 +397,10 @@ def grid_of(scene: Scene, torus: Array | None, cell: float) -> tuple[Grid, Array
 
 
 def pair(array: NDArray[Any]) -> Any:
-    """An array (2,) as a tuple of two Python numbers."""
     return tuple(array.tolist())
 
 
-def walls_by_cell(
-    scene: Scene, low: Array, side: Array, shape: NDArray[np.int64]
-) -> tuple[NDArray[Any], NDArray[Any]]:
-    """The walls that a disk in each cell may touch: the start of each cell's list, (cells + 1,),
-    and all lists."""
-    centre = low + side * (
-        np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), -1).reshape(-1, 2) + 0.5
-    )
-    reach = (np.hypot(*side) / 2 + scene.radius.max()) * WIDER
-    near = np.zeros((len(centre), len(scene.walls)), bool)
-    for w, (start, end) in enumerate(scene.walls):
-        along = end - start
-        share = np.clip((centre - start) @ along / (along @ along), 0, 1)
-        near[:, w] = np.hypot(*(centre - start - share[:, None] * along).T) <= reach
-    return np.append(0, near.sum(axis=1).cumsum()).astype(np.int64), np.nonzero(near)[1].astype(
-        np.int64
-    )
-
-
 def disks_of(scene: Scene, position: Array, low: Array) -> NDArray[np.void]:
-    """The disks at t = 0, not yet linked to cells and without records."""
     n, size = scene.n, DISK.itemsize
     room = np.zeros(size * n + 64, np.uint8)
     skip = -room.ctypes.data % 64  # so that each begins a cache line
@@ -440,7 +417,6 @@ def disks_of(scene: Scene, position: Array, low: Array) -> NDArray[np.void]:
 
 
 def spins_of(scene: Scene) -> NDArray[np.void]:
-    """The rotation of the disks at t = 0."""
     spins = np.zeros(scene.n, SPIN)
     spins["angle"], spins["spin"] = scene.angle, scene.angular_velocity
     spins["inverse_inertia"] = np.where(scene.static, 0.0, 1 / scene.inertia)

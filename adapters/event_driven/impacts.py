@@ -1,8 +1,15 @@
-"""Collisions of the event engine: Newton's restitution along the line of centres. Friction is in
-friction.py.
+"""Collisions of the event engine: Newton's restitution along the line of centres, the tangential
+impulse of friction; and the sliding or rolling of a disk that rests on a wall.
 
 Collisions are logged and counted, to detect accumulation: collisions with less time between them
 than float64 resolves, or without flights between them.
+
+In a collision the impulse of friction is min(mu J_n, |slip| / K) against the slip of the contact
+points, K = 1/m_a + 1/m_b + r_a2/I_a + r_b2/I_b. For disks this is exact: the normal passes through
+their centres, so that the normal impulse changes no slip, and the impulse of friction no speed
+along the normal (Foerster, Louge, Chang & Allia, Phys. Fluids 6, 1108, 1994; Stronge, Impact
+Mechanics, 2000, ch. 3). On a wall the force of friction is mu N against the slip; without slip it
+is the force that keeps the slip 0, at most mu N.
 """
 
 from __future__ import annotations
@@ -21,15 +28,18 @@ from crosscheck2d.adapters.event_driven.disks import (
     GOES_ON,
     LOGGED,
     NOBODY,
+    SLIP_END,
     STOP,
     Arena,
+    Spins,
     Walls,
 )
-from crosscheck2d.adapters.event_driven.friction import apply_wall_friction, update_wall_friction
 from crosscheck2d.adapters.event_driven.rest import (
     COLLISIONS,
     check_rest,
     corner_acceleration,
+    normal_component,
+    outward,
     rattles,
     rests,
     second_wall,
@@ -37,6 +47,7 @@ from crosscheck2d.adapters.event_driven.rest import (
     touched_part,
 )
 from crosscheck2d.adapters.event_driven.search import ROUNDING, image
+from crosscheck2d.scenarios.model import Array
 
 
 @inlined
@@ -92,7 +103,6 @@ def collide_wall(walls: Walls, a: Any, w: int, part: int, restitution: float) ->
 
 @inlined
 def log_collision(arena: Arena, now: float, i: int, j: int, impulse: float) -> None:
-    """Add a collision to the log."""
     log, k = arena.log, arena.counters[LOGGED]
     log[k, 0], log[k, 1], log[k, 2], log[k, 3] = arena.clock[BASE] + now, i, j, impulse
     arena.counters[LOGGED] += 1
@@ -100,7 +110,7 @@ def log_collision(arena: Arena, now: float, i: int, j: int, impulse: float) -> N
 
 @inlined
 def set_end(arena: Arena, now: float, i: int, j: int) -> None:
-    """Set when and for which disks the answer ends, should the status say that it does."""
+    # Set when and for which disks the answer ends, should the status say that it does.
     arena.clock[STOP], arena.counters[END_DISK], arena.counters[END_PARTNER] = (
         arena.clock[BASE] + now,
         i,
@@ -127,7 +137,6 @@ def count_and_log(arena: Arena, a: Any, i: int, j: int, impulse: float) -> bool:
 
 @inlined
 def invalidate(a: Any) -> None:
-    """Make the records of others about a disk stale, and forget its last collision."""
     a.count += 1
     a.last = NOBODY
 
@@ -136,8 +145,6 @@ def invalidate(a: Any) -> None:
 def rattles_on_disk(
     run: Any, a: Any, b: Any, restitution: float, impulse: float, counts: bool
 ) -> bool:
-    """Whether a disk that has just collided with disk `b` rattles between what it touches, see
-    `rattles`."""
     if a.weight == 0.0:
         return False
     run.walls = 0
@@ -191,3 +198,136 @@ def collide_with_wall(arena: Arena, i: int, w: int, part: int) -> int:
     if corner >= 0 and walls_only and (a.free_ax != 0.0 or a.free_ay != 0.0):
         to_and_fro = not slow(a) or corner_acceleration(walls, a, w, corner) > 0.0
     return ACCUMULATION if trapped or (accumulates and not to_and_fro) else GOES_ON
+
+
+@kernel
+def carry_rotation(s: Any, now: float) -> None:
+    t = now - s.t
+    s.angle += (s.spin + s.rate * t / 2) * t
+    s.spin += s.rate * t
+    s.t = now
+
+
+@kernel
+def limited(wanted: float, most: float) -> float:
+    return min(max(wanted, -most), most)
+
+
+@kernel
+def apply_disk_friction(arena: Arena, i: int, j: int, impulse: float) -> None:
+    """impulse: N s along the normal."""
+    a, b, s, r = arena.disks[i], arena.disks[j], arena.spins[i], arena.spins[j]
+    carry_rotation(s, a.t)
+    carry_rotation(r, a.t)
+    dx = b.x - a.x + image(b.cx - a.cx, arena.grid.shift[0])
+    dy = b.y - a.y + image(b.cy - a.cy, arena.grid.shift[1])
+    distance = sqrt(dx * dx + dy * dy)
+    tx, ty = -dy / distance, dx / distance
+    slip = tx * (b.vx - a.vx) + ty * (b.vy - a.vy) - a.radius * s.spin - b.radius * r.spin
+    inverse_effective_mass = (
+        a.weight + b.weight + a.radius**2 * s.inverse_inertia + b.radius**2 * r.inverse_inertia
+    )
+    kick = limited(-slip / inverse_effective_mass, arena.rules.friction * impulse)
+    apply_impulse(a, s, -kick * tx, -kick * ty, kick)
+    apply_impulse(b, r, kick * tx, kick * ty, kick)
+    noise = ROUNDING * abs(kick) * (a.weight + b.weight)
+    a.noise += noise
+    b.noise += noise
+
+
+@kernel
+def apply_wall_friction(arena: Arena, i: int, w: int, part: int, impulse: float) -> None:
+    """part 0 of the wall is its face, 1 its start, 2 its end; impulse: N s along the normal."""
+    a, s, walls = arena.disks[i], arena.spins[i], arena.walls
+    carry_rotation(s, a.t)
+    if part == 0:
+        nx, ny = outward(walls, a, w)
+    else:
+        nx, ny = a.x - walls.segment[w, 0], a.y - walls.segment[w, 1]
+        if part == 2:
+            nx -= walls.segment[w, 4] * walls.segment[w, 2]
+            ny -= walls.segment[w, 4] * walls.segment[w, 3]
+        distance = sqrt(nx * nx + ny * ny)
+        nx, ny = nx / distance, ny / distance
+    # The disk is on the side of its normal, so that its rim moves at r spin along (ny, -nx).
+    tx, ty = ny, -nx
+    slip = tx * a.vx + ty * a.vy + a.radius * s.spin
+    inverse_effective_mass = a.weight + a.radius**2 * s.inverse_inertia
+    kick = limited(-slip / inverse_effective_mass, arena.rules.friction * impulse)
+    apply_impulse(a, s, kick * tx, kick * ty, -kick)
+    a.noise += ROUNDING * abs(kick) * a.weight
+
+
+@kernel
+def apply_impulse(a: Any, s: Any, jx: float, jy: float, kick: float) -> None:
+    # Apply an impulse (jx, jy) N s to the rim of a disk; its angular impulse is r `kick`,
+    # clockwise.
+    a.vx += a.weight * jx
+    a.vy += a.weight * jy
+    s.spin -= a.radius * s.inverse_inertia * kick
+
+
+@kernel
+def slip_on(arena: Arena, i: int) -> tuple[float, float, float]:
+    """The direction in which a positive spin moves the contact point of disk i on its wall; and its
+    slip, m/s."""
+    a, s = arena.disks[i], arena.spins[i]
+    nx, ny = outward(arena.walls, a, a.wall)
+    return ny, -nx, ny * a.vx - nx * a.vy + a.radius * s.spin
+
+
+@kernel
+def update_wall_friction(arena: Arena, i: int) -> None:
+    """Update the acceleration of disk i by friction: after it has come to rest on a wall or left
+    it, or when its acceleration has changed."""
+    a, s = arena.disks[i], arena.spins[i]
+    carry_rotation(s, a.t)
+    s.rate, s.sliding = s.free_rate, 0
+    if a.wall < 0:
+        return
+    tx, ty, slip = slip_on(arena, i)
+    if abs(slip) > ROUNDING * (abs(a.vx) + abs(a.vy) + a.radius * abs(s.spin)):
+        s.sliding = 1 if slip > 0.0 else -1
+    along = a.free_ax * tx + a.free_ay * ty
+    most = -arena.rules.friction * normal_component(arena.walls, a, a.wall, a.free_ax, a.free_ay)
+    if s.sliding == 0:
+        driven = along + a.radius * s.free_rate
+        wanted = -driven / (1.0 + a.radius**2 * s.inverse_inertia / a.weight)
+        force = limited(wanted, most)
+        if force != wanted:
+            s.sliding = 1 if driven > 0.0 else -1
+    else:
+        force = -s.sliding * most
+    a.ax, a.ay = (along + force) * tx, (along + force) * ty
+    s.rate += a.radius * s.inverse_inertia * force / a.weight
+
+
+@kernel
+def predict_slip_end(arena: Arena, i: int) -> None:
+    a, s = arena.disks[i], arena.spins[i]
+    if a.wall < 0 or s.sliding == 0:
+        return
+    carry_rotation(s, a.t)
+    tx, ty, slip = slip_on(arena, i)
+    slower = -s.sliding * (a.ax * tx + a.ay * ty + a.radius * s.rate)
+    if slower > 0.0 and a.t + abs(slip) / slower < a.own_time:
+        a.own_time, a.own_code = a.t + abs(slip) / slower, SLIP_END
+
+
+@kernel
+def roll(arena: Arena, i: int) -> None:
+    a, s = arena.disks[i], arena.spins[i]
+    carry_rotation(s, a.t)
+    s.spin -= slip_on(arena, i)[2] / a.radius
+    update_wall_friction(arena, i)
+    a.count += 1
+
+
+@kernel
+def rotation_at(spins: Spins, base: float, at: float, out: Array) -> None:
+    """Angle and angular velocity of all disks at `at` s, not before the last event, into out (n,
+    2); changes nothing."""
+    for i in range(len(spins)):
+        s = spins[i]
+        t = at - base - s.t
+        out[i, 0], out[i, 1] = s.angle + (s.spin + s.rate * t / 2) * t, s.spin + s.rate * t

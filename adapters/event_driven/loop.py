@@ -34,26 +34,25 @@ from crosscheck2d.adapters.event_driven.disks import (
     Runs,
     Scenery,
     Spins,
+    Tree,
     cross,
     fly,
     link_by_position,
+    put,
     unlink,
 )
-from crosscheck2d.adapters.event_driven.friction import (
-    apply_disk_friction,
-    predict_slip_end,
-    roll,
-    update_wall_friction,
-)
 from crosscheck2d.adapters.event_driven.impacts import (
+    apply_disk_friction,
     collide,
     collide_with_wall,
     count_and_log,
     invalidate,
+    predict_slip_end,
     rattles_on_disk,
+    roll,
     set_end,
+    update_wall_friction,
 )
-from crosscheck2d.adapters.event_driven.queue import Tree, put
 from crosscheck2d.adapters.event_driven.rest import (
     check_rest,
     next_in_line,
@@ -62,7 +61,7 @@ from crosscheck2d.adapters.event_driven.rest import (
     take_off,
     update_support,
 )
-from crosscheck2d.adapters.event_driven.search import ALL, ROUNDING, find_own, find_pair
+from crosscheck2d.adapters.event_driven.search import ALL, ROUNDING, find_pair, next_edge, next_own
 from crosscheck2d.scenarios.model import Array
 
 EPOCH = 256.0  # s after which the clock restarts at 0, so that the last place of times stays small
@@ -91,7 +90,7 @@ def advance(arena: Arena, scenery: Scenery, until: float) -> int:
         status, partner, side = carry_out(arena, scenery, i, now)
         if status != GOES_ON:
             return status
-        predict_both(arena, scenery, i, partner, side)
+        predict(arena, scenery, i, partner, side)
     return GOES_ON
 
 
@@ -120,32 +119,28 @@ def carry_out(arena: Arena, scenery: Scenery, i: int, now: float) -> tuple[int, 
 
 
 @inlined_early
-def predict_both(arena: Arena, scenery: Scenery, i: int, j: int, side: int) -> None:
-    """Make new records for the disks of an event; in a loop, so that the machine code holds one
-    copy of the search."""
+def predict(arena: Arena, scenery: Scenery, i: int, j: int, side: int) -> None:
+    """Make new records for the disks i and j (-1: none) of an event at the present time; in a loop,
+    so that the machine code holds one copy of the search."""
     while i >= 0:
-        if arena.disks[i].weight > 0.0:
-            predict(arena, scenery, i, side == ALL, side)
+        a = arena.disks[i]
+        if a.weight > 0.0:
+            if side == ALL:  # else the contact in the old record is still valid
+                a.pair_time = inf
+            if len(scenery):
+                best, code = next_own(arena.grid, arena.walls, arena.rules.wrapped, a)
+            else:
+                best, code = next_edge(arena.grid, a)
+            a.own_time, a.own_code = a.t + best, code
+            if len(scenery) and arena.rules.friction > 0.0:
+                predict_slip_end(arena, i)
+            find_pair(arena, scenery, i, side)
+            put(arena.tree, i, min(a.pair_time, a.own_time))
         i, j = j, -1
 
 
 @inlined_early
-def predict(arena: Arena, scenery: Scenery, i: int, fresh: bool, beyond: int) -> None:
-    """Make a new record for disk `i`, which is at the present time; fresh: drop the contact in the
-    old one."""
-    a = arena.disks[i]
-    if fresh:
-        a.pair_time = inf
-    find_own(arena, scenery, a)
-    if len(scenery) and arena.rules.friction > 0.0:
-        predict_slip_end(arena, i)
-    find_pair(arena, scenery, i, beyond)
-    put(arena.tree, i, min(a.pair_time, a.own_time))
-
-
-@inlined_early
 def collision(arena: Arena, scenery: Scenery, i: int, j: int) -> int:
-    """Disks i and j collide."""
     a, b = arena.disks[i], arena.disks[j]
     new_to_a, new_to_b = a.last != j, b.last != i
     impulse = collide(a, b, i, j, arena.grid.shift, arena.rules.restitution)
@@ -173,8 +168,6 @@ def collision(arena: Arena, scenery: Scenery, i: int, j: int) -> int:
 
 @kernel
 def own_event(arena: Arena, i: int) -> int:
-    """Carry out an event of disk `i` on its own, except a change of cell: a wall, an edge of the
-    wrap, the end of its wall, or the end of its slip."""
     code = arena.disks[i].own_code
     if code >= WALL:
         return collide_with_wall(arena, i, (code - WALL) // 3, (code - WALL) % 3)
@@ -211,7 +204,6 @@ def leave(arena: Arena, i: int) -> int:
 
 @kernel
 def wrap(arena: Arena, i: int, side: int) -> int:
-    """Disk `i` leaves the wrap box over one side and re-enters over the opposite one."""
     a = arena.disks[i]
     if side < 2:
         a.x = arena.walls.wrap[1 - side, 0]
@@ -226,7 +218,6 @@ def wrap(arena: Arena, i: int, side: int) -> int:
 
 @kernel
 def overlapping(disks: Disks, i: int) -> int:
-    """The index of a disk that overlaps disk `i`, -1 if there is none."""
     a = disks[i]
     for j in range(len(disks)):
         b = disks[j]
@@ -241,7 +232,7 @@ def overlapping(disks: Disks, i: int) -> int:
 
 @kernel
 def begin_epoch(disks: Disks, tree: Tree, runs: Runs, spins: Spins, clock: Array) -> None:
-    """Move the origin of all times by EPOCH s."""
+    # Move the origin of all times by EPOCH s.
     clock[BASE] += EPOCH
     for i in range(len(disks)):
         a = disks[i]
@@ -257,7 +248,7 @@ def begin_epoch(disks: Disks, tree: Tree, runs: Runs, spins: Spins, clock: Array
 
 @kernel
 def begin(disks: Disks, head: Links, tree: Tree, g: Grid) -> None:
-    """Link all disks to their cells; their first records are made by the first events."""
+    # Link all disks to their cells; their first records are made by the first events.
     for i in range(len(disks)):
         link_by_position(disks, head, g, i)
         schedule_search(disks[i], tree, i, 0.0)
@@ -265,7 +256,7 @@ def begin(disks: Disks, head: Links, tree: Tree, g: Grid) -> None:
 
 @inlined
 def schedule_search(a: Any, tree: Tree, i: int, now: float) -> None:
-    """Give disk `i` a stale contact at `now`, so that the loop makes a new record for it."""
+    # Give disk `i` a stale contact at `now`, so that the loop makes a new record for it.
     if a.weight > 0.0:
         a.partner, a.partner_count, a.pair_time = i, -1, now
         put(tree, i, now)

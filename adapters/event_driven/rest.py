@@ -34,7 +34,6 @@ def outward(walls: Walls, a: Any, w: int) -> tuple[float, float]:
 
 @kernel
 def normal_component(walls: Walls, a: Any, w: int, x: float, y: float) -> float:
-    """The component of a vector (x, y) along the normal of wall `w`, towards a disk."""
     nx, ny = outward(walls, a, w)
     return nx * x + ny * y
 
@@ -75,21 +74,7 @@ def next_in_line(walls: Walls, g: Grid, a: Any) -> int:
 
 @kernel
 def take_off(a: Any) -> None:
-    """Let a disk that rests on a wall fly again."""
     a.ax, a.ay, a.wall = a.free_ax, a.free_ay, -1
-
-
-@kernel
-def leave_corner(walls: Walls, a: Any) -> None:
-    """Let a disk that a collision moves out of its corner rest on the wall along which it moves, if
-    its acceleration presses it onto that."""
-    if abs(normal_component(walls, a, a.corner, a.vx, a.vy)) < abs(
-        normal_component(walls, a, a.wall, a.vx, a.vy)
-    ):
-        a.wall = a.corner
-    a.corner = -1
-    if normal_component(walls, a, a.wall, a.free_ax, a.free_ay) >= 0.0:
-        take_off(a)
 
 
 @inlined
@@ -97,7 +82,14 @@ def check_rest(walls: Walls, a: Any) -> None:
     """After a collision, let a disk stay at rest on its wall only if it has no normal speed
     there."""
     if a.corner >= 0 and abs(a.vx) + abs(a.vy) > a.noise:
-        leave_corner(walls, a)
+        # it is moved out of its corner: it rests on the wall along which it moves, if on any
+        if abs(normal_component(walls, a, a.corner, a.vx, a.vy)) < abs(
+            normal_component(walls, a, a.wall, a.vx, a.vy)
+        ):
+            a.wall = a.corner
+        a.corner = -1
+        if normal_component(walls, a, a.wall, a.free_ax, a.free_ay) >= 0.0:
+            take_off(a)
     if a.wall >= 0:
         if a.corner >= 0:
             a.vx, a.vy = 0.0, 0.0

@@ -15,14 +15,10 @@ from crosscheck2d.adapters import system
 from crosscheck2d.adapters.engine import ContactImpulse, NotLoaded
 from crosscheck2d.adapters.host.file import SolverFailed
 from crosscheck2d.adapters.host.process import end
-from crosscheck2d.adapters.library_at_version import LibraryAtVersion
+from crosscheck2d.adapters.library_at_version import LibraryAtVersion, NotInstalled
 from crosscheck2d.adapters.library_versions import BOX2D
-from crosscheck2d.adapters.npm_packages import NotInstalled
 from crosscheck2d.adapters.safe_path import python
 from crosscheck2d.scenarios.model import Array, Scene, State
-
-Call = tuple[Any, ...]
-"""A method of the engine and its arguments; of "make" the class of the adapter and its own."""
 
 # (this process, folder) -> a process that waits for the next engine; it ends with this one
 waiting: dict[tuple[int, Path], subprocess.Popen[bytes]] = {}
@@ -40,25 +36,23 @@ class EngineApart:
     def __init__(
         self, library: LibraryAtVersion, place: str, *arguments: Any, **settings: Any
     ) -> None:
-        self.library, self.made = library, ("make", place, arguments, settings)
+        self.name = f"{library.package} {library.version}"
+        self.library, self.made = library, (place, arguments, settings)
         self.process: subprocess.Popen[bytes] | None = None
-        self.calls: list[Call] = []  # they have no result, and are made before the next
+        self.calls: list[tuple[Any, ...]] = []  # without a result, made before the next
 
     def load(self, scene: Scene, dt: float) -> None:
-        """Start the process if there is none; raises `NotLoaded` if the version is not there, or
-        cannot be imported."""
         if self.process is None:
             self.start()
-            self.ask(*self.made)
+            self.ask("make", *self.made)
         self.calls.clear()
         self.ask("load", scene, dt, self.listening)
 
     def start(self) -> None:
-        """A process with the library, or one that waits."""
         try:
             folder = self.library.checked()
         except NotInstalled as reason:
-            raise NotLoaded(f"{self.library.package} {self.library.version}: {reason}") from None
+            raise NotLoaded(f"{self.name}: {reason}") from None
         self.process = waiting.pop((os.getpid(), folder), None)
         if self.process is not None and self.process.poll() is None:
             return
@@ -71,7 +65,6 @@ class EngineApart:
         )
 
     def ask(self, *call: Any) -> Any:
-        """The result of a call, or what it raised."""
         process, calls = self.process, [*self.calls, call]
         self.process = None  # until there is an answer: one that is interrupted is not used again
         self.calls.clear()
@@ -84,8 +77,7 @@ class EngineApart:
             result, raised = pickle.load(process.stdout)
         except (EOFError, OSError):
             end(process)
-            library = f"{self.library.package} {self.library.version}"
-            what = f"the process of {library} ended (exit status {process.returncode})"
+            what = f"the process of {self.name} ended (exit status {process.returncode})"
             raise SolverFailed("crashed", what) from None
         except BaseException:
             end(process)
@@ -96,34 +88,27 @@ class EngineApart:
         return result
 
     def apply_force(self, disk: int, force: Array, torque: float) -> None:
-        """Sent with the next step."""
         self.calls.append(("apply_force", disk, force, torque))
 
     def step(self, count: int = 1) -> None:
-        """One exchange with the process."""
         self.wrapping += self.ask("step", count)
 
     def read(self) -> State:
-        """One exchange with the process."""
         state: State = self.ask("read")
         return state
 
     def collisions(self) -> list[ContactImpulse]:
-        """Those of the engine."""
         return list(self.ask("collisions"))
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
-        """Those of the engine."""
         return dict(self.ask("settings"))
 
     def versions(self) -> dict[str, str]:
-        """Those of the engine, with the hash of what was fetched."""
         versions: dict[str, str] = self.ask("versions")
         versions.pop(BOX2D, None)  # of the distribution that is installed
         return versions | self.library.versions
 
     def close(self) -> None:
-        """Let the process wait for its next use."""
         if self.process is not None:
             key = os.getpid(), self.library.folder
             if before := waiting.pop(key, None):
@@ -133,7 +118,6 @@ class EngineApart:
 
 
 def serve(folder: str) -> None:
-    """In the process: answer calls until the other side ends."""
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # a library may write to it
     system.end_with_parent()

@@ -4,7 +4,7 @@ of the exercise; each is driven in a process of its own, by the same messages.""
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -19,20 +19,28 @@ from crosscheck2d.adapters.engine import SILENT, ContactImpulse, NotLoaded, Unsu
 from crosscheck2d.adapters.engine_row import FLOAT64, EngineRow
 from crosscheck2d.adapters.float32 import must_fit, rounding
 from crosscheck2d.adapters.friction import must_be_frictionless
-from crosscheck2d.adapters.host.beside import imported_by
-from crosscheck2d.adapters.host.features import features_of, must_model, refusal
 from crosscheck2d.adapters.host.file import (
     LONGEST,
     SolverFailed,
     SolverText,
+    imported_by,
     printable,
     read_solver,
 )
 from crosscheck2d.adapters.host.process import SolverProcess
 from crosscheck2d.adapters.host.restitution import EXERCISE, restitution_of
-from crosscheck2d.adapters.host.surface import ENGINE, HOW, holder_of, is_engine, must_be_either
-from crosscheck2d.adapters.library_at_version import LibraryAtVersion
-from crosscheck2d.adapters.npm_packages import NotInstalled, text_of, version_of
+from crosscheck2d.adapters.host.surface import (
+    ENGINE,
+    HOW,
+    features_of,
+    holder_of,
+    is_engine,
+    must_be_either,
+    must_model,
+    refusal,
+)
+from crosscheck2d.adapters.library_at_version import LibraryAtVersion, NotInstalled
+from crosscheck2d.adapters.npm_packages import pinned_file, text_of, version_of
 from crosscheck2d.scenarios.model import Array, Scene, State
 
 HERE = Path(__file__).parent
@@ -45,6 +53,7 @@ BEGIN_LIMIT = 2.0  # s that initScene may take
 # The relative rounding that the probes allow: that of an engine that stores a velocity as the
 # difference of two positions some 1e-4 m apart.
 ROUNDING = 2.0**-36
+ARRAYS = ("position", "velocity", "radius", "angle", "angular_velocity", "walls", "gravity")
 NEEDED = {"integrate": "integrate", "collide": "sphereSphereCollisionHandling"}
 CALLED = {"load": "create", "step": "step", "play": "step or read"}
 
@@ -59,16 +68,10 @@ def scene_message(scene: Scene, dt: float, **more: Any) -> dict[str, Any]:
     return {
         "n": scene.n,
         "dt": dt,
-        "position": scene.position.tolist(),
-        "velocity": scene.velocity.tolist(),
-        "radius": scene.radius.tolist(),
+        **{name: getattr(scene, name).tolist() for name in ARRAYS},
         "mass": plain(scene.mass),
         "inertia": plain(scene.inertia),
-        "angle": scene.angle.tolist(),
-        "angular_velocity": scene.angular_velocity.tolist(),
-        "walls": scene.walls.tolist(),
         "box": box_of(scene.walls),
-        "gravity": scene.gravity.tolist(),
         "restitution": scene.restitution,
         "friction": scene.friction,
         "wrap": None if scene.wrap is None else scene.wrap.tolist(),
@@ -78,12 +81,14 @@ def scene_message(scene: Scene, dt: float, **more: Any) -> dict[str, Any]:
 
 
 def box_of(walls: Array) -> list[list[float]] | None:
-    """Low and high corner of the box that four walls make; None if they make none."""
-    low, high = (f(walls, axis=(0, 1), initial=z) for f, z in ((np.min, np.inf), (np.max, -np.inf)))
-    corners = [low.tolist(), [high[0], low[1]], high.tolist(), [low[0], high[1]]]
+    if len(walls) != 4:
+        return None
+    low, high = walls.min(axis=(0, 1)).tolist(), walls.max(axis=(0, 1)).tolist()
+    corners = [low, [high[0], low[1]], high, [low[0], high[1]]]
     sides = {frozenset(map(tuple, side)) for side in zip(corners, corners[1:] + corners[:1])}
-    fits = len(walls) == 4 and {frozenset(map(tuple, wall)) for wall in walls.tolist()} == sides
-    return [low.tolist(), high.tolist()] if fits else None
+    return (
+        [low, high] if {frozenset(map(tuple, wall)) for wall in walls.tolist()} == sides else None
+    )
 
 
 class GuestEngine:
@@ -93,6 +98,10 @@ class GuestEngine:
         compiled.
     collected: steps are requested together with the next `read`: a frame under thrust is one
         exchange with the process instead of one per step.
+
+    Attributes:
+        inside: s that V8 took for the steps so far, of the time of `step`: the rest is the exchange
+            with the process.
     """
 
     listening, wrapping = True, 0.0
@@ -104,12 +113,11 @@ class GuestEngine:
     ) -> None:
         self.solver, self.path = solver, solver.path
         self.patience, self.limit, self.collected = patience, STEP_LIMIT, collected
+        self.inside = 0.0
         self.started: SolverProcess | None = None
 
     @property
     def process(self) -> SolverProcess:
-        """The process, started when first needed; raises `NotLoaded` if the file cannot be
-        loaded."""
         if self.started is None:
             try:
                 self.started = SolverProcess(self.solver, compiled=True)
@@ -122,7 +130,6 @@ class GuestEngine:
         """What has to be known of the file before a scene."""
 
     def load(self, scene: Scene, dt: float) -> None:
-        """Build a new world; raises `Unsupported` if the guest cannot play the scene."""
         assert self.process  # it is started, and known
         self.refuse(scene)
         self.scene, self.forces = scene, np.zeros((scene.n, 3))
@@ -136,49 +143,40 @@ class GuestEngine:
         """Raise `Unsupported` for a scene that the guest cannot play."""
 
     def message(self, scene: Scene, dt: float) -> dict[str, Any]:
-        """The scene as the guest gets it."""
         return scene_message(scene, dt, listening=self.listening)
 
     def do(self, command: str, argument: Any, limit: float) -> Any:
-        """One request to the process; raises `SolverFailed`."""
         return self.process.do(command, argument, limit)
 
     def apply_force(self, disk: int, force: Array, torque: float) -> None:
-        """Add to the force and torque of the next step; nothing moves a static disk."""
         if not self.scene.static[disk]:
             self.forces[disk] += [*force, torque]
 
     def step(self, count: int = 1) -> None:
-        """One request for all the steps, at once or, if `collected`, with the next `read`."""
         forces = self.forces.tolist() if self.forces.any() else None
         single = forces is not None and count == 1
+        request = {"count": count, "forces": forces, "held": single}
         last = self.requested[-1] if self.requested else {}
-        if single and last.get("held") and last["forces"] == forces:
-            last["count"] += 1  # a frame under thrust: one list of forces, not one for each step
-        else:
-            self.requested.append({"count": count, "forces": forces, "held": single})
         self.forces[:] = 0.0
         self.steps += count
         self.rows = None
         if not self.collected:
-            for steps in self.take():
-                self.do("step", steps, self.limit)
+            self.inside += self.do("step", request, self.limit)
             self.limit = self.patience
-
-    def take(self) -> list[dict[str, Any]]:
-        """Return the steps not yet requested, and mark them as requested."""
-        requested, self.requested = self.requested, []
-        return requested
+        elif single and last.get("held") and last["forces"] == forces:
+            last["count"] += 1  # a frame under thrust: one list of forces, not one for each step
+        else:
+            self.requested.append(request)
 
     def look(self) -> Array:
         """(n, 6) x, y, u, v, angle, spin; also records collisions."""
         if self.rows is None:
-            self.rows = self.readings(self.do("play", self.take(), self.limit))[0]
+            requested, self.requested = self.requested, []
+            self.rows = self.readings(self.do("play", requested, self.limit))[0]
             self.limit = self.patience
         return self.rows
 
     def readings(self, answer: dict[str, Any]) -> Array:
-        """(readings, n, 6) of an answer; the collisions behind them are noted."""
         numbers, shape = answer["numbers"], (answer["readings"], self.scene.n, 6)
         rows, heard = np.split(numbers, [np.prod(shape)])
         self.log += [
@@ -188,7 +186,6 @@ class GuestEngine:
         return rows.reshape(shape)
 
     def read(self) -> State:
-        """All disks in one exchange."""
         rows = self.look()
         return State(*(rows[:, part].copy() for part in (slice(0, 2), slice(2, 4), 4, 5)))
 
@@ -199,11 +196,9 @@ class GuestEngine:
         return [collision for collision in self.log if collision.step < self.steps]
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
-        """As the guest reads them back."""
         return {name: (wanted, value) for name, wanted, value in self.resolved}
 
     def of_file(self) -> dict[str, tuple[Any, Any]]:
-        """The file, and the modules that it imports from its folder."""
         files = ", ".join(file for file, _ in self.solver.imported)
         which = {"file": (str(self.path), f"sha256 {self.solver.digest}")}
         if not files:
@@ -211,11 +206,9 @@ class GuestEngine:
         return which | {"from beside it": (None, f"{files}; sha256 of all {self.solver.source}")}
 
     def versions(self) -> dict[str, str]:
-        """The versions of the language's engine, and of a package."""
         return self.process.versions
 
     def close(self) -> None:
-        """End the process."""
         if self.started is not None:
             self.started.close()
             self.started = None
@@ -227,9 +220,6 @@ class PackageEngine(GuestEngine):
     Its file says what the profiles choose; `changed` are keys of that choice; `library` is another
     version than the pinned one. The driver does the wrap, and its time is in that of `step`.
 
-    Attributes:
-        inside: s that V8 took for the steps so far, of the time of `step`: the rest is the exchange
-            with the process.
     """
 
     load_limit = 2 * STEP_LIMIT
@@ -245,8 +235,7 @@ class PackageEngine(GuestEngine):
         **changed: Any,
     ) -> None:
         self.package, self.profile, self.changed = package, profile, changed
-        self.library = library
-        self.float32, self.inside = float32, 0.0
+        self.library, self.float32 = library, float32
         file = HERE / f"{name}.js"
         text = file.read_text(encoding="utf-8")
         super().__init__(SolverText(file, "javascript", text, "", engine=True))
@@ -254,41 +243,30 @@ class PackageEngine(GuestEngine):
 
     @property
     def process(self) -> SolverProcess:
-        """The process, with the package's text; raises `NotLoaded` if it is not installed."""
         if self.started is None:
             name, library = self.package, self.library
             try:
-                text = library.text() if library else text_of(name)
+                text = library.text(pinned_file(name)) if library else text_of(name)
                 versions = library.versions if library else {name: version_of(name)}
                 self.solver = replace(self.solver, package=text, versions=versions)
             except NotInstalled as reason:
                 raise NotLoaded(f"{name}: {reason}") from None
         return super().process
 
-    def learn(self, process: SolverProcess) -> None:
-        """Its disks turn."""
-        process.do("turns", True)
-
     def refuse(self, scene: Scene) -> None:
-        """A number of the scene overflows in float32, where the engine computes in it."""
         if self.float32:
             must_fit(scene)
         self.expected, self.thrown = (0, 0), None
         self.ahead = deque[Array]()
 
     def message(self, scene: Scene, dt: float) -> dict[str, Any]:
-        """The scene, the profile and its changes."""
         return super().message(scene, dt) | {"profile": self.profile, "changed": self.changed}
 
     def do(self, command: str, argument: Any, limit: float) -> Any:
-        """The answer of the process; raises `Unsupported` where the engine's file refuses."""
         try:
-            answer = super().do(command, argument, limit)
+            return super().do(command, argument, limit)
         except SolverFailed as failure:
             raise refused(failure) from None
-        if command == "step":
-            self.inside += answer
-        return answer
 
     def expect(self, count: int, times: int, thrusts: Sequence[Foreseen] = ()) -> None:
         """The next `times` calls are `step(count)`, each followed by `read`, and only `thrusts`
@@ -298,23 +276,14 @@ class PackageEngine(GuestEngine):
         self.expected, self.thrusts = (count, times), sorted(acting, key=lambda row: row.step)
 
     def step(self, count: int = 1) -> None:
-        """One exchange with the process for all the steps, or none if they have been played ahead.
-
-        Raises:
-            ValueError: other steps were expected, and have been played.
-        """
-        if self.expected[1] and self.expected[0] == count and not self.forces.any():
-            self.steps += count
-            self.rows = self.next_expected()
+        expected, times = self.expected
+        if not times or expected != count or self.forces.any():
+            if self.ahead:
+                raise ValueError("steps were expected that have been played, and do not come")
+            self.expected = (0, 0)
+            super().step(count)
             return
-        if self.ahead:
-            raise ValueError("steps were expected that have been played, and do not come")
-        self.expected = (0, 0)
-        super().step(count)
-
-    def next_expected(self) -> Array:
-        """The reading after the steps that come next, which are played now or have been."""
-        count, times = self.expected
+        self.steps += count
         if not self.ahead and self.thrown is None:
             argument = {"count": count, "times": times, "thrusts": self.thrusts}
             answer = self.do("ahead", argument, self.limit)
@@ -325,10 +294,9 @@ class PackageEngine(GuestEngine):
             assert self.thrown is not None
             raise refused(self.thrown)
         self.expected = (count, times - 1)
-        return self.ahead.popleft()
+        self.rows = self.ahead.popleft()
 
     def read(self) -> State:
-        """All disks in one exchange; static disks stay as the scene states them."""
         state, scene = super().read(), self.scene
         still = scene.static
         return State(
@@ -339,7 +307,6 @@ class PackageEngine(GuestEngine):
         )
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
-        """As the engine's file reads them back."""
         rows = super().settings()
         if self.float32:
             rows["float32 rounding of the start in m"] = (None, rounding(self.scene))
@@ -347,7 +314,6 @@ class PackageEngine(GuestEngine):
 
 
 def refused(failure: SolverFailed) -> Exception:
-    """What a failure of an engine is: `Unsupported` if it refuses the scene."""
     return Unsupported(failure.what) if failure.kind == "refused" else failure
 
 
@@ -360,26 +326,20 @@ class OwnEngine(GuestEngine):
     """
 
     def learn(self, process: SolverProcess) -> None:
-        """What it models; it lacks no function."""
         if missing := [name for name in ENGINE if not process.functions[name]]:
             raise SolverFailed("error", f"has no function {' and no '.join(missing)}; {HOW}")
         self.models = features_of(process.functions["models"])
-        process.do("turns", "rotation" in self.models)
 
     def refuse(self, scene: Scene) -> None:
-        """What the scene has, and the file does not model."""
         must_model(scene, self.models, self.path.name)
 
     def apply_force(self, disk: int, force: Array, torque: float) -> None:
-        """Add to the forces of the next step; raises `Unsupported` if the file does not model
-        forces."""
         needed = ["forces", "rotation"] if torque else ["forces"]
         if missing := [word for word in needed if word not in self.models]:
             raise Unsupported(refusal(self.path.name, missing))
         super().apply_force(disk, force, torque)
 
     def do(self, command: str, argument: Any, limit: float) -> Any:
-        """The answer of the process; a failure names the file and the function."""
         try:
             return super().do(command, argument, limit)
         except SolverFailed as failure:
@@ -394,7 +354,6 @@ class OwnEngine(GuestEngine):
             raise
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
-        """The settings that the file decides."""
         return {
             "models": (None, ", ".join(self.models)),
             "restitution": (None, "the scene's"),
@@ -418,16 +377,16 @@ class OwnSolver(GuestEngine):
     load_limit = STEP_LIMIT
 
     def learn(self, process: SolverProcess) -> None:
-        """Its restitution, where it is a constant in the file."""
         self.whole = process.surface == "advance"
         if not self.whole:
-            make_globals(process)
+            if process.functions["begin"]:  # as the exercise's page does before the first step
+                with suppress(SolverFailed):  # a function that needs it fails with its own message
+                    process.do("begin", None, BEGIN_LIMIT)
             self.restitution = restitution_of(self.solver, process)
             if self.restitution.own is not None:
                 self.own_restitution = self.restitution.own
 
     def refuse(self, scene: Scene) -> None:
-        """A missing function, friction, walls, disks that cannot move, another restitution."""
         must_be_frictionless(scene, self.path.name)
         if self.whole:
             return
@@ -446,18 +405,9 @@ class OwnSolver(GuestEngine):
             )
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
-        """The settings that the file decides."""
         own = "the scene's" if self.whole else str(self.restitution)
         order = "the file's own advance" if self.whole else "integrate all, every pair i < j, wrap"
         return {"restitution": (None, own), "order of a step": (None, order), **self.of_file()}
-
-
-def make_globals(process: SolverProcess) -> None:
-    """Let the file make its own scene, as the exercise's page does before the first step, because
-    its functions may use `ufo` or `asteroids`."""
-    if process.functions["begin"]:
-        with suppress(SolverFailed):  # a function that needs them fails with its own message
-            process.do("begin", None, BEGIN_LIMIT)
 
 
 def row_of_file(path: Path, patience: float = STEP_LIMIT, collected: bool = False) -> EngineRow:
@@ -468,8 +418,9 @@ def row_of_file(path: Path, patience: float = STEP_LIMIT, collected: bool = Fals
     engine = holder is not None or is_engine(solver)
     if not engine:
         must_be_either(solver)
-    solver = replace(solver, engine=engine, holder=holder)
-    solver = replace(solver, packages=tuple(sorted(packages_named(solver))))
+    texts = [solver.text, *(text for _, text in solver.imported)] * (solver.kind == "python")
+    packages = tuple(sorted(set[str]().union(*map(imported_by, texts))))
+    solver = replace(solver, engine=engine, holder=holder, packages=packages)
     make = OwnEngine if engine else OwnSolver
     return EngineRow(
         partial(make, solver, patience, collected),
@@ -479,11 +430,3 @@ def row_of_file(path: Path, patience: float = STEP_LIMIT, collected: bool = Fals
         source=solver.source,
         exercise=not engine,
     )
-
-
-def packages_named(solver: SolverText) -> Iterable[str]:
-    """The modules that the import statements of a Python file, and of those beside it, name."""
-    if solver.kind != "python":
-        return set()
-    texts = [solver.text, *(text for _, text in solver.imported)]
-    return set[str]().union(*map(imported_by, texts))

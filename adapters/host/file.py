@@ -1,20 +1,27 @@
-"""Reads a guest's file as text, and says in a sentence why it cannot be one.
+"""Reads a guest's file as text, with the modules that it imports from its own folder, and says in a
+sentence why it cannot be one.
 
 A file is read once. This text is played, checked and hashed; what is saved later does not matter.
 """
 
 from __future__ import annotations
 
+import ast
 import codecs
 import hashlib
+import os
 import re
 import stat
-from collections.abc import Mapping
+import sys
+import warnings
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from importlib.machinery import PathFinder
 from pathlib import Path
+from threading import Lock
 from typing import Any
 
-from crosscheck2d.adapters.host.beside import modules_beside, reference_modules
+from crosscheck2d.adapters.safe_path import PACKAGE
 
 LARGEST = 2**20  # bytes; the exercise's file has about 5000
 # times its limit that a call may take by the clock: on a busy machine it gets a part of a processor
@@ -24,6 +31,15 @@ LONGEST = 300  # characters of a message
 DOCUMENTS = {b"%PDF-": "a PDF", b"PK\x03\x04": "a zip, or a document of Office", rb"{\rtf": "RTF"}
 KINDS = {".js": "javascript", ".py": "python"}
 DEF = re.compile(r"^[ \t]*def \w+\(.*:", re.MULTILINE)
+OURS = (PACKAGE, "reference_impl")
+REFERENCE = Path(__file__).parents[2] / "reference_impl"
+USES_REFERENCE = re.compile(
+    r"^\s*(?:from|import)\s+(?:(?:crosscheck2d\.)?reference_impl\b|\.(?:state|compiled)\b)",
+    re.MULTILINE,
+)
+# One text at a time: Python before 3.11.8 counts the depth of its parser over all threads together
+# (gh-106905).
+PARSING = Lock()
 FUNCTION = re.compile(r"^function \w+\s*\(.*\)\s*\{", re.MULTILINE)
 
 
@@ -55,7 +71,6 @@ class SolverFailed(Exception):
 
     @property
     def status(self) -> str:
-        """The status of a run that it ends, one of `STATUSES` of run.py."""
         return self.kind if self.kind in ("timeout", "crashed", "diverged") else "error"
 
     def __str__(self) -> str:
@@ -63,8 +78,8 @@ class SolverFailed(Exception):
 
 
 def printable(text: str) -> str:
-    """Foreign text on one line, with control characters escaped, because they would act on a
-    terminal."""
+    # Foreign text on one line, with control characters escaped, because they would act on a
+    # terminal.
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
@@ -103,12 +118,18 @@ class SolverText:
 
     @property
     def reference(self) -> dict[str, str]:
-        """The modules of this program that it is given."""
-        return reference_modules(self.text) if self.kind == "python" else {}
+        """The two modules that a copy of the exercise's solver imports, by both of their names."""
+        if self.kind != "python" or not USES_REFERENCE.search(self.text):
+            return {}
+        texts = {"__init__.py": ""}
+        for file in ("state.py", "compiled.py"):
+            texts[file] = (REFERENCE / file).read_text(encoding="utf-8")
+        folders = ("reference_impl", "crosscheck2d/reference_impl")
+        return {f"{folder}/{file}": text for folder in folders for file, text in texts.items()}
 
     @property
     def order(self) -> dict[str, Any]:
-        """What its process is told, which does not tell where the file is."""
+        # What its process is told, which does not tell where the file is.
         return {
             "kind": self.kind,
             "name": self.path.name,
@@ -136,11 +157,10 @@ def read_solver(path: Path, within: Path | None = None) -> SolverText:
     within: in a class the student's own folder, out of which nothing is read; or the file itself,
     if it lies beside those of others: then no module is beside it.
     """
-    kind = KINDS.get(path.suffix.lower())
+    ending = path.suffix.lower()
+    kind = KINDS.get(ending)
     if kind is None:
-        hint = (
-            "; unpack it" if path.suffix.lower() in PACKED else HINTS.get(path.suffix.lower(), "")
-        )
+        hint = HINTS.get(ending, "; unpack it" if ending in PACKED else "")
         raise NotASolver(
             f"{path}: ends in {path.suffix or 'nothing'}; a solver is a .js or a .py file{hint}"
         )
@@ -154,17 +174,19 @@ def read_solver(path: Path, within: Path | None = None) -> SolverText:
         raise NotASolver(f"{path}: is written in Python; give it a name that ends in .py")
     if kind == "python" and javascript and not python:
         raise NotASolver(f"{path}: is written in JavaScript; give it a name that ends in .js")
-    if kind == "javascript":
-        imported = read_library(path, text)
-    else:
+    if kind == "python":
         imported = {} if within == path else read_imported(path, text, within)
-    return SolverText(
-        path, kind, text, hashlib.sha256(data).hexdigest()[:16], tuple(sorted(imported.items()))
-    )
+    else:
+        # it imports numpy, which --help does not need
+        from crosscheck2d.adapters.host.gl_matrix import gl_matrix_of, where_to
+
+        library = gl_matrix_of(path, text)
+        imported = {name: decoded(at, read_bytes(at, where_to())) for name, at in library.items()}
+    digest = hashlib.sha256(data).hexdigest()[:16]
+    return SolverText(path, kind, text, digest, tuple(sorted(imported.items())))
 
 
 def must_be_own(path: Path, within: Path | None) -> None:
-    """Raise `NotASolver` for a link to what is not the student's."""
     if within is not None:
         home = within.parent.resolve() / within.name
         if not path.resolve().is_relative_to(home):
@@ -172,37 +194,72 @@ def must_be_own(path: Path, within: Path | None) -> None:
 
 
 def read_imported(path: Path, text: str, within: Path | None = None) -> dict[str, str]:
-    """The texts of the modules that a solver of that `text` imports from its own folder; raises
-    `NotASolver`."""
+    """File, relative to that of `path`, and text of each module that an import statement names, in
+    the file or in another of these, and that is not installed: none hides a library. What is
+    opened or imported by other means at run time is not covered."""
     itself, imported = path.resolve(), dict[str, str]()
-
-    def text_of(one: Path) -> str:
-        wanted = "a module that a solver imports is a file"
-        must_be_own(one, within)
-        return text if one == itself else decoded(one, read_bytes(one, wanted))
-
-    for file, module in modules_beside(itself.parent, text, text_of):
-        imported[file] = module
-        if sum(map(len, imported.values())) > LARGEST:
-            raise NotASolver(
-                f"{path}: imports more than 1 MB from its folder; a solver has a few kilobytes"
-            )
+    seen, names = set[str](), imported_by(text)
+    while names:
+        name = names.pop()
+        if name in seen or is_library(name, itself.parent):
+            continue
+        seen.add(name)
+        for file in files_of(itself.parent, name):
+            must_be_own(file, within)
+            wanted = "a module that a solver imports is a file"
+            module = text if file == itself else decoded(file, read_bytes(file, wanted))
+            names |= imported_by(module)
+            imported[file.relative_to(itself.parent).as_posix()] = module
+            if sum(map(len, imported.values())) > LARGEST:
+                raise NotASolver(
+                    f"{path}: imports more than 1 MB from its folder; a solver has a few kilobytes"
+                )
     return imported
 
 
-def read_library(path: Path, text: str) -> dict[str, str]:
-    """The text of the gl-matrix that an Exercise.js of that `text` calls, if there is one; raises
-    `NotASolver`."""
-    # it imports numpy, which --help does not need
-    from crosscheck2d.adapters.host.gl_matrix import gl_matrix_of, where_to
+def module_of(text: str) -> ast.Module | None:
+    """None if it is not Python, which is reported when it is run."""
+    try:
+        with PARSING, warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # warnings about the text, meant for its author
+            return ast.parse(text)
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        return None
 
-    found = gl_matrix_of(path, text)
-    return {} if found is None else {found[0]: decoded(found[1], read_bytes(found[1], where_to()))}
+
+def imported_by(text: str) -> set[str]:
+    """The top-level names of modules."""
+    names = set()
+    for node in ast.walk(module_of(text) or ast.Module([], [])):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            names.add(node.module)
+    return {name.partition(".")[0] for name in names}
+
+
+def is_library(name: str, folder: Path) -> bool:
+    if name in sys.builtin_module_names or name in sys.stdlib_module_names or name in OURS:
+        return True
+    spec = PathFinder.find_spec(name, [path for path in sys.path if Path(path).resolve() != folder])
+    # a folder without __init__.py is found last
+    return spec is not None and spec.origin is not None
+
+
+def files_of(folder: Path, name: str) -> Sequence[Path]:
+    package, module = folder / name, folder / f"{name}.py"
+    try:
+        module.lstat()
+    except FileNotFoundError:
+        pass
+    except OSError:  # the name is too long for a file
+        return []
+    if module.exists() and not (package / "__init__.py").exists():
+        return [module]
+    return sorted(package.rglob("*.py"))
 
 
 def read_bytes(path: Path, wanted: str) -> bytes:
-    """All bytes of a small file; raises `NotASolver`, which says what is `wanted` instead of
-    something that is not a file."""
     try:
         about = path.stat()
         if not stat.S_ISREG(about.st_mode):
@@ -215,21 +272,14 @@ def read_bytes(path: Path, wanted: str) -> bytes:
             )
         return path.read_bytes()
     except OSError as fault:
+        what = f"{fault.strerror or fault}; name a file that can be read"
         if dangling(path):
-            raise NotASolver(
-                f"{path}: is a link to {path.readlink()}, which is not there"
-            ) from None
-        raise NotASolver(
-            f"{path}: {fault.strerror or fault}; name a file that can be read"
-        ) from None
+            what = f"is a link to {path.readlink()}, which is not there"
+        raise NotASolver(f"{path}: {what}") from None
 
 
 def dangling(path: Path) -> bool:
-    """Whether it is a link to nothing."""
-    try:
-        return path.is_symlink() and not path.exists()
-    except OSError:  # a name that is too long for a file
-        return False
+    return os.path.islink(path) and not os.path.exists(path)
 
 
 def decoded(path: Path, data: bytes) -> str:
@@ -239,7 +289,6 @@ def decoded(path: Path, data: bytes) -> str:
 
 
 def letters(path: Path, data: bytes) -> str:
-    """The text as in `decoded`, with its own line ends."""
     if data.startswith((codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE)):
         return data.decode("utf-32", errors="replace")
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):

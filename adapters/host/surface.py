@@ -1,14 +1,17 @@
-"""Which functions a file defines decides what it is: a solver of the exercise or an engine."""
+"""What a file is and models: the functions that it defines make it a solver of the exercise or an
+engine; a scene with features that the line `models` of an engine leaves out is refused."""
 
 from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 
-from crosscheck2d.adapters.host.beside import module_of
-from crosscheck2d.adapters.host.file import NotASolver, SolverText
+from crosscheck2d.adapters.engine import Unsupported
+from crosscheck2d.adapters.friction import Frictionless
+from crosscheck2d.adapters.host.file import NotASolver, SolverFailed, SolverText, module_of
 from crosscheck2d.adapters.host.restitution import code_of
+from crosscheck2d.scenarios.model import Scene
 
 ENGINE = ("create", "step", "read")
 # Names of the exercise: those that an engine may also use, and those that it does not.
@@ -53,7 +56,6 @@ def holder_of(solver: SolverText) -> str | None:
 
 
 def must_be_either(solver: SolverText) -> None:
-    """Raise `NotASolver` for a file that defines names, but no function of either kind."""
     names = defined_in(solver.text, solver.kind)
     known = (*ENGINE, *EXERCISE, *SHARED)
     if names and not any(re.search(rf"\b{name}\b", solver.text) for name in known):
@@ -78,7 +80,6 @@ def defined_in(text: str, kind: str) -> set[str]:
 
 
 def names_of(body: Iterable[ast.stmt]) -> Iterator[str]:
-    """The names that statements of a module bind, also those within an `if` or a `try`."""
     for node in body:
         if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)):
             yield node.name
@@ -95,6 +96,48 @@ def names_of(body: Iterable[ast.stmt]) -> Iterator[str]:
 
 
 def listed(names: Iterable[str]) -> str:
-    """Names as "one, two and three"."""
     *others, last = names
     return f"{', '.join(others)} and {last}" if others else last
+
+
+# ---- the line `models` ---------------------------------------------------------------------------
+
+# Word in the line -> its name in a sentence.
+FEATURES = {
+    "disks": "more than one disk",
+    "walls": "walls",
+    "gravity": "gravity",
+    "static": "disks that cannot move",
+    "forces": "forces on disks",
+    "rotation": "rotation",
+    "friction": "friction",
+    "wrap": "the wrap at the edges",
+}
+
+
+def features_of(line: object) -> list[str]:
+    asked = f"models must be a text with some of the words {', '.join(FEATURES)}"
+    if not isinstance(line, str):
+        raise SolverFailed("error", f"has no line models; {asked}")
+    if unknown := [word for word in line.split() if word not in FEATURES]:
+        raise SolverFailed("error", f"models has the word {unknown[0]!r}; {asked}")
+    return line.split()
+
+
+def must_model(scene: Scene, models: Collection[str], who: str) -> None:
+    has = {
+        "disks": scene.n > 1,
+        "walls": len(scene.walls) > 0,
+        "gravity": scene.gravity.any(),
+        "static": scene.static.any(),
+        "rotation": scene.angular_velocity.any(),
+        "friction": scene.friction > 0,
+        "wrap": scene.wrap is not None,
+    }
+    if more := [word for word, there in has.items() if there and word not in models]:
+        kind = Frictionless if more == ["friction"] else Unsupported
+        raise kind(refusal(who, more))
+
+
+def refusal(who: str, more: Collection[str]) -> str:
+    return f"{who} does not model {', '.join(FEATURES[word] for word in more)}"

@@ -80,23 +80,19 @@ class AblatedReference(Reference):
         self.order, self.substeps, self.alpha, self.mixing = tuple(order), substeps, alpha, mixing
         self.friction = friction
         self.moves = substeps * self.order.count("move")
+        # of a move in units of a h2, beside v h, so that the whole step has alpha
+        drift = 0.0
+        if alpha is not None:
+            after = self.order.index("accelerate") < self.order.index("move")
+            drift = self.moves * alpha - (self.moves - 1) / 2 - after
         # an int instead of a float would compile the solver again
         kinds = Parameters._field_defaults
         numbers = {name: type(kinds[name])(value) for name, value in parameters.items()}
         self.on = Parameters(
-            np.array([STAGES.index(stage) for stage in self.order]), self._drift(), **numbers
+            np.array([STAGES.index(stage) for stage in self.order]), drift, **numbers
         )
 
-    def _drift(self) -> float:
-        """The term, in units of a h2, that each move adds to v h so that the whole step has
-        alpha."""
-        if self.alpha is None:
-            return 0.0
-        after = self.order.index("accelerate") < self.order.index("move")
-        return self.moves * self.alpha - (self.moves - 1) / 2 - after
-
     def load(self, scene: Scene, dt: float) -> None:
-        """Copy the scene into the solver's arrays."""
         self.kept = no_contacts(scene.n, len(scene.walls), self.precision)
         self.kept.facing[:] = np.stack([np.cos(scene.angle), np.sin(scene.angle)], axis=1)
         super().load(scene, dt)
@@ -106,18 +102,17 @@ class AblatedReference(Reference):
         )
 
     def _entered(self, *_: Array) -> Callable[[int], list[Any]]:
-        return self._advance
-
-    def _advance(self, count: int) -> list[Any]:
-        """The collisions of `count` steps; the solver counts substeps."""
         h = self.precision(self.dt / self.moves)
-        collisions = ablated_reference.advance(
-            self.disks, self.world, self.on, self.kept, h, count * self.substeps
-        )
-        return [(k // self.substeps, i, j, impulse) for k, i, j, impulse in collisions]
+
+        def advance(count: int) -> list[Any]:
+            collisions = ablated_reference.advance(
+                self.disks, self.world, self.on, self.kept, h, count * self.substeps
+            )
+            return [(k // self.substeps, i, j, impulse) for k, i, j, impulse in collisions]
+
+        return advance
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
-        """The enabled mechanisms."""
         reported = {
             "mixing": self.mixing,
             "substeps": self.substeps,

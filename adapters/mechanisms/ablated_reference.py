@@ -19,6 +19,7 @@ from crosscheck2d.adapters.mechanisms.contacts import (
     carried_off,
     closing,
     detect,
+    detect_again,
     drive_to_target,
     gap_along,
     gap_of,
@@ -26,8 +27,7 @@ from crosscheck2d.adapters.mechanisms.contacts import (
     rub,
     turn,
 )
-from crosscheck2d.adapters.mechanisms.recycling import detect_again
-from crosscheck2d.reference_impl.compiled import compiled, internal, pasted
+from crosscheck2d.reference_impl.compiled import compiled, internal
 from crosscheck2d.reference_impl.coulomb import carry_over, collide, collide_wall
 from crosscheck2d.reference_impl.exercise import touching, touching_wall, wrap
 from crosscheck2d.reference_impl.state import Disks, World
@@ -51,24 +51,8 @@ STAGES = (
     "relax",
     "restitute",
 )
-(
-    ACCELERATE,
-    MOVE,
-    PAIRS,
-    WALLS,
-    DETECT,
-    BY_ISLAND,
-    BY_COLOUR,
-    AIM,
-    WARM_START,
-    BOUNCE,
-    CAP,
-    POSITION_CORRECTION,
-    NUDGE,
-    SOFTEN,
-    RELAX,
-    RESTITUTE,
-) = range(len(STAGES))
+ACCELERATE, MOVE, PAIRS, WALLS, DETECT, BY_ISLAND, BY_COLOUR, AIM = range(8)
+WARM_START, BOUNCE, CAP, POSITION_CORRECTION, NUDGE, SOFTEN, RELAX, RESTITUTE = range(8, 16)
 
 
 class Parameters(NamedTuple):
@@ -108,7 +92,7 @@ class Parameters(NamedTuple):
 
 
 @compiled
-def advance(
+def advance(  # noqa: C901, PLR0912 - a branch for each stage: numba has no table of functions
     disks: Disks, world: World, on: Parameters, kept: Contacts, h: float, count: int
 ) -> list[Collision]:
     """Advance `count` steps, each move by `h` s; return the collisions as `exercise.advance`
@@ -119,7 +103,41 @@ def advance(
             kept.start[i, 0], kept.start[i, 1] = disks.position[i, 0], disks.position[i, 1]
         kept.moved[:], kept.turned[:] = 0.0, 0.0
         for stage in on.order:
-            act(stage, disks, world, on, kept, h, k, collisions)
+            if stage == ACCELERATE:
+                accelerate(disks, world, h)
+            elif stage == MOVE:
+                move(disks, world, on, kept, h)
+            elif stage == PAIRS:
+                pairs(disks, world, on, k, collisions)
+            elif stage == WALLS:
+                walls(disks, world, on, k, collisions)
+            elif stage == DETECT:
+                if on.recycled > 0.0:
+                    detect_again(disks, world, on.margin, on.recycled, on.fattened, kept)
+                else:
+                    detect(disks, world, on.margin, on.skin, on.touching, on.memory, kept)
+            elif stage == BY_ISLAND:
+                by_island(disks.mass, kept)
+            elif stage == BY_COLOUR:
+                by_colour(disks.mass, kept)
+            elif stage == AIM:
+                aim(disks.velocity, world.restitution, on, kept)
+            elif stage == WARM_START:
+                warm_start(disks, on, kept)
+            elif stage == BOUNCE:
+                bounce(disks, world, on, kept)
+            elif stage == CAP:
+                cap(disks.velocity, on.cap, h)
+            elif stage == POSITION_CORRECTION:
+                position_correction(disks, world, on, kept)
+            elif stage == NUDGE:
+                nudge(disks.mass, on, kept, h)
+            elif stage == SOFTEN:
+                soften(disks, world, on, kept, h, True)
+            elif stage == RELAX:
+                soften(disks, world, on, kept, h, False)
+            elif stage == RESTITUTE:
+                restitute(disks, world, on, kept)
         for c in range(kept.found[0]):
             if kept.rows[c].impulse > 0.0:
                 collisions.append((k, kept.rows[c].i, kept.rows[c].j, kept.rows[c].impulse))
@@ -130,58 +148,8 @@ def advance(
     return collisions
 
 
-@pasted
-def act(  # noqa: C901, PLR0912 - a branch for each stage: numba has no table of functions
-    stage: int,
-    disks: Disks,
-    world: World,
-    on: Parameters,
-    kept: Contacts,
-    h: float,
-    k: int,
-    collisions: list[Collision],
-) -> None:
-    """One stage."""
-    if stage == ACCELERATE:
-        accelerate(disks, world, h)
-    elif stage == MOVE:
-        move(disks, world, on, kept, h)
-    elif stage == PAIRS:
-        pairs(disks, world, on, k, collisions)
-    elif stage == WALLS:
-        walls(disks, world, on, k, collisions)
-    elif stage == DETECT:
-        if on.recycled > 0.0:
-            detect_again(disks, world, on.margin, on.recycled, on.fattened, kept)
-        else:
-            detect(disks, world, on.margin, on.skin, on.touching, on.memory, kept)
-    elif stage == BY_ISLAND:
-        by_island(disks.mass, kept)
-    elif stage == BY_COLOUR:
-        by_colour(disks.mass, kept)
-    elif stage == AIM:
-        aim(disks.velocity, world.restitution, on, kept)
-    elif stage == WARM_START:
-        warm_start(disks, on, kept)
-    elif stage == BOUNCE:
-        bounce(disks, world, on, kept)
-    elif stage == CAP:
-        cap(disks.velocity, on.cap, h)
-    elif stage == POSITION_CORRECTION:
-        position_correction(disks, world, on, kept)
-    elif stage == NUDGE:
-        nudge(disks.mass, on, kept, h)
-    elif stage == SOFTEN:
-        soften(disks, world, on, kept, h, True)
-    elif stage == RELAX:
-        soften(disks, world, on, kept, h, False)
-    elif stage == RESTITUTE:
-        restitute(disks, world, on, kept)
-
-
 @internal
 def accelerate(disks: Disks, world: World, h: float) -> None:
-    """v += a h for disks that can move; the angular velocity alike."""
     for i in range(len(disks.mass)):
         if disks.mass[i] != inf:
             for axis in range(2):
@@ -221,7 +189,7 @@ def move(disks: Disks, world: World, on: Parameters, kept: Contacts, h: float) -
 
 
 @internal
-def turn_along(angle, facing, i: int, by: float) -> None:  # type: ignore[no-untyped-def]
+def turn_along(angle, facing, i: int, by: float) -> None:
     """Turn (cos, sin) of disk i along its tangent, and normalise it (Box2D 3.1,
     b2IntegrateRotation): by atan(by), and by what rounding (cos, sin) adds."""
     c, s = facing[i, 0] - facing[i, 1] * by, facing[i, 1] + facing[i, 0] * by
@@ -233,7 +201,6 @@ def turn_along(angle, facing, i: int, by: float) -> None:  # type: ignore[no-unt
 
 @compiled
 def pairs(disks: Disks, world: World, on: Parameters, k: int, collisions: list[Collision]) -> None:
-    """Task 2 of the exercise for each pair of disks in turn."""
     x, radius = disks.position, disks.radius
     for i in range(len(radius)):
         for j in range(i + 1, len(radius)):
@@ -243,7 +210,6 @@ def pairs(disks: Disks, world: World, on: Parameters, k: int, collisions: list[C
 
 @compiled
 def walls(disks: Disks, world: World, on: Parameters, k: int, collisions: list[Collision]) -> None:
-    """Task 2 of the exercise for each disk and wall in turn."""
     x, radius = disks.position, disks.radius
     for i in range(len(radius)):
         for w in range(len(world.walls)):
@@ -282,7 +248,7 @@ def meet(
 
 
 @compiled
-def aim(v, restitution: float, on: Parameters, kept: Contacts) -> None:  # type: ignore[no-untyped-def]
+def aim(v, restitution: float, on: Parameters, kept: Contacts) -> None:
     """Set the target velocity of every contact, before any impulse: e times the closing speed, 0
     for slow collisions.
 
@@ -327,8 +293,7 @@ def bounce(disks: Disks, world: World, on: Parameters, kept: Contacts) -> None:
 
 
 @internal
-def cap(v, most: float, h: float) -> None:  # type: ignore[no-untyped-def]
-    """Cut velocities that would move a disk by more than `most` m."""
+def cap(v, most: float, h: float) -> None:
     for i in range(len(v)):
         far = sqrt(v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1]) * h
         if far > most:
@@ -370,7 +335,7 @@ def correct_island(
 
 
 @internal
-def nudge(mass, on: Parameters, kept: Contacts, h: float) -> None:  # type: ignore[no-untyped-def]
+def nudge(mass, on: Parameters, kept: Contacts, h: float) -> None:
     """Give overlapping disks a velocity for the next move only, which undoes a fraction of the
     overlap beyond the slop."""
     for c in range(kept.found[0]):

@@ -2,10 +2,12 @@
 from step to step.
 
 A contact is of disk i and disk j, or wall w as j = -1 - w. Its normal n points from j to i, as at
-its detection. Compiled by numba, as `exercise` is.
+its detection. In Rapier (`detect_again`) a pair is tested when its boxes start to overlap, and
+again only after a relative motion above a given length: until then a contact keeps its normal and
+contact points, and a pair without contact stays without. Compiled by numba, as `exercise` is.
 """
 
-from math import cos, inf
+from math import cos, hypot, inf, sin
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,6 +19,8 @@ from crosscheck2d.reference_impl.exercise import direction, move, nearest_point
 from crosscheck2d.reference_impl.state import Disks, World
 
 forget_stale(Path(__file__).parent, Path(compiling.__file__).parent)
+
+TURNED = 0.98  # cos of the rotation after which a body is tested again
 
 CONTACT = np.dtype(
     [
@@ -68,13 +72,12 @@ class Contacts(NamedTuple):
     nudge: np.ndarray  # (n, 2) m/s: added to the velocity in the next move only
     # (n, n + w, 5): impulse, slide, colour, age in steps (0: long ago), and total
     before: np.ndarray
-    looks: np.ndarray  # (n, n + w) of `recycling.LOOK`
-    boxes: np.ndarray  # (n + w, 4) m: of `recycling`, left, bottom, right, top
+    looks: np.ndarray  # (n, n + w) of `LOOK`
+    boxes: np.ndarray  # (n + w, 4) m: of `detect_again`, left, bottom, right, top
     least: np.ndarray  # (4,) m: the smallest box of one body
 
 
 def no_contacts(n: int, walls: int, precision: type) -> Contacts:
-    """An empty table of contacts for `n` disks and `walls` walls; positions have this precision."""
     most = n * (n - 1) // 2 + n * walls
     place: np.ndarray = np.zeros((n, 2), precision)
     return Contacts(
@@ -131,7 +134,6 @@ def detect(
 
 @internal
 def remember(memory: int, kept: Contacts) -> None:
-    """Keep the impulses of the last step's contacts, and drop those older than `memory` steps."""
     rows, columns = kept.before.shape[:2]
     for i in range(rows):
         for other in range(columns):
@@ -148,7 +150,6 @@ def remember(memory: int, kept: Contacts) -> None:
 
 @internal
 def note(disks: Disks, world: World, skin: float, kept: Contacts, i: int, j: int) -> None:
-    """Add a contact with its last impulses."""
     contact, other = kept.rows[kept.found[0]], column(j, len(disks.radius))
     kept.found[0] += 1
     contact.i, contact.j = i, j
@@ -163,12 +164,11 @@ def note(disks: Disks, world: World, skin: float, kept: Contacts, i: int, j: int
 
 @internal
 def column(j: int, n: int) -> int:
-    """The column of `before` for disk j, or for wall -1 - j."""
     return j if j >= 0 else n - 1 - j
 
 
 @compiled
-def by_island(mass, kept: Contacts) -> None:  # type: ignore[no-untyped-def]
+def by_island(mass, kept: Contacts) -> None:
     """Sort the contacts into islands, which share no moving disk, in the order of a depth-first
     search.
 
@@ -199,7 +199,7 @@ def by_island(mass, kept: Contacts) -> None:  # type: ignore[no-untyped-def]
 
 
 @internal
-def by_colour(mass, kept: Contacts) -> None:  # type: ignore[no-untyped-def]
+def by_colour(mass, kept: Contacts) -> None:
     """Sort the contacts by colour: no moving disk has two contacts of one colour.
 
     A new contact takes the first free colour, from the second on if only one body can move, and
@@ -225,8 +225,7 @@ def by_colour(mass, kept: Contacts) -> None:  # type: ignore[no-untyped-def]
 
 
 @internal
-def taken(mass, kept: Contacts, c: int, colour: int) -> bool:  # type: ignore[no-untyped-def]
-    """Whether a moving disk of contact c has another contact of this colour."""
+def taken(mass, kept: Contacts, c: int, colour: int) -> bool:
     i, j = kept.rows[c].i, kept.rows[c].j
     moving_i, moving_j = mass[i] != inf, j >= 0 and mass[j] != inf
     for k in range(kept.found[0]):
@@ -252,7 +251,7 @@ def gap_of(disks: Disks, world: World, i: int, j: int) -> tuple[float, float, fl
 
 
 @internal
-def gap_along(moved, contact) -> float:  # type: ignore[no-untyped-def]
+def gap_along(moved, contact) -> float:
     """The gap in m along the normal of the contact: when it was found, plus the motion of both
     bodies since then."""
     i, j = contact.i, contact.j
@@ -263,7 +262,7 @@ def gap_along(moved, contact) -> float:  # type: ignore[no-untyped-def]
 
 
 @internal
-def carried_off(radius, turned, contact) -> float:  # type: ignore[no-untyped-def]
+def carried_off(radius, turned, contact) -> float:
     """The change of the gap, in m, because the contact points have turned with the disks
     (Box2D 3.1, b2SolveContact: moving anchors)."""
     i, j = contact.i, contact.j
@@ -274,7 +273,7 @@ def carried_off(radius, turned, contact) -> float:  # type: ignore[no-untyped-de
 
 
 @internal
-def closing(v, i: int, j: int, nx: float, ny: float) -> float:  # type: ignore[no-untyped-def]
+def closing(v, i: int, j: int, nx: float, ny: float) -> float:
     """The relative velocity along n in m/s, negative while the bodies approach."""
     speed = v[i, 0] * nx + v[i, 1] * ny
     if j >= 0:
@@ -283,13 +282,12 @@ def closing(v, i: int, j: int, nx: float, ny: float) -> float:  # type: ignore[n
 
 
 @internal
-def inverse_mass(mass, i: int, j: int) -> float:  # type: ignore[no-untyped-def]
-    """The sum of the inverse masses in 1/kg; 0 for a wall."""
+def inverse_mass(mass, i: int, j: int) -> float:
     return 1.0 / mass[i] + (1.0 / mass[j] if j >= 0 else 0.0)
 
 
 @internal
-def drive_to_target(disks: Disks, contact, target: float, share: float, memory: float) -> None:  # type: ignore[no-untyped-def]
+def drive_to_target(disks: Disks, contact, target: float, share: float, memory: float) -> None:
     """Apply the impulse that gives a contact its target velocity; the sum stays at least 0.
 
     A soft contact gets the fraction `share` of it, minus `memory` times its impulse so far.
@@ -302,7 +300,7 @@ def drive_to_target(disks: Disks, contact, target: float, share: float, memory: 
 
 
 @internal
-def apply_pair(rows, mass, i: int, j: int, nx: float, ny: float, by: float) -> None:  # type: ignore[no-untyped-def]
+def apply_pair(rows, mass, i: int, j: int, nx: float, ny: float, by: float) -> None:
     """Add `by` along n to row i and against n to row j, each by its inverse mass."""
     move(rows, i, nx, ny, by / mass[i])
     if j >= 0:
@@ -310,7 +308,7 @@ def apply_pair(rows, mass, i: int, j: int, nx: float, ny: float, by: float) -> N
 
 
 @internal
-def rub(disks: Disks, contact, friction: float, lever: float) -> None:  # type: ignore[no-untyped-def]
+def rub(disks: Disks, contact, friction: float, lever: float) -> None:
     """Reduce the slip of the surfaces with a tangential impulse of at most `friction` times the
     normal one.
 
@@ -330,10 +328,125 @@ def rub(disks: Disks, contact, friction: float, lever: float) -> None:  # type: 
 
 
 @internal
-def turn(disks: Disks, contact, by: float, lever: float) -> None:  # type: ignore[no-untyped-def]
-    """Apply `by` N s along the tangent, which turns both disks in the same sense."""
+def turn(disks: Disks, contact, by: float, lever: float) -> None:
     i, j, inertia = contact.i, contact.j, disks.inertia
     apply_pair(disks.velocity, disks.mass, i, j, -contact.ny, contact.nx, by)
     disks.angular_velocity[i] -= (disks.radius[i] + contact.seen * lever) * by / inertia[i]
     if j >= 0:
         disks.angular_velocity[j] -= (disks.radius[j] + contact.seen * lever) * by / inertia[j]
+
+
+@internal
+def detect_again(
+    disks: Disks, world: World, margin: float, recycled: float, fattened: float, kept: Contacts
+) -> None:
+    """Find the contacts, pairs i < j with a gap below `margin`, then walls, but test only pairs
+    whose boxes overlap and that have moved by more than `recycled`; by more than `margin` if they
+    were no contact (Rapier, process_pair)."""
+    n = len(disks.radius)
+    remember(1, kept)
+    kept.found[0] = 0
+    enclose(disks, world, margin / 2, fattened, kept)
+    for i in range(n):
+        for j in range(i + 1, n):
+            if disks.mass[i] != inf or disks.mass[j] != inf:
+                consider(disks, world, margin, recycled, kept, i, j)
+    for i in range(n):
+        for w in range(len(world.walls)):
+            if disks.mass[i] != inf:
+                consider(disks, world, margin, recycled, kept, i, -1 - w)
+
+
+@internal
+def enclose(disks: Disks, world: World, margin: float, fattened: float, kept: Contacts) -> None:
+    """Renew every box that does not contain its body and `margin` around it.
+
+    A box is larger by `fattened`, except the first one (parry, Bvh::insert_or_update_partially).
+    Boxes have the precision of the positions, because the last digit decides whether a disk leaves
+    its box after a whole number of steps.
+    """
+    n, x, least = len(disks.radius), disks.position, kept.least
+    for k in range(n + len(world.walls)):
+        box = kept.boxes[k]
+        for axis in range(2):
+            if k < n:
+                least[axis] = x[k, axis] - disks.radius[k]
+                least[2 + axis] = x[k, axis] + disks.radius[k]
+            else:
+                ends = world.walls[k - n]
+                least[axis] = min(ends[0, axis], ends[1, axis])
+                least[2 + axis] = max(ends[0, axis], ends[1, axis])
+            least[axis] -= margin
+            least[2 + axis] += margin
+        if not (
+            box[0] <= least[0] and box[1] <= least[1] and least[2] <= box[2] and least[3] <= box[3]
+        ):
+            more = fattened if box[0] <= box[2] else 0.0
+            for axis in range(2):
+                box[axis], box[2 + axis] = least[axis] - more, least[2 + axis] + more
+
+
+@internal
+def consider(
+    disks: Disks, world: World, margin: float, recycled: float, kept: Contacts, i: int, j: int
+) -> None:
+    n = len(disks.radius)
+    look, one, other = kept.looks[i, column(j, n)], kept.boxes[i], kept.boxes[column(j, n)]
+    if one[0] > other[2] or other[0] > one[2] or one[1] > other[3] or other[1] > one[3]:
+        look.known = False
+        return
+    most = recycled if look.touches else min(recycled, margin)
+    if not look.known or drift(disks, world, look, i, j) > most:
+        look.known = True
+        look.gap, look.nx, look.ny = gap_of(disks, world, i, j)
+        look.touches = look.gap < margin
+        look.x, look.y, look.angle, look.other = lie(disks, i, j)
+    if look.touches:
+        note(disks, world, 0.0, kept, i, j)
+        contact = kept.rows[kept.found[0] - 1]
+        contact.nx, contact.ny, contact.seen = look.nx, look.ny, look.gap
+        contact.gap = gap_since(disks, look, i, j)
+
+
+@internal
+def lie(disks: Disks, i: int, j: int) -> tuple[float, float, float, float]:
+    """The centre of disk j (the origin for a wall) in the frame of disk i; the angles of both."""
+    x, angle = disks.position, disks.angle[i]
+    dx, dy, other = -x[i, 0], -x[i, 1], 0.0
+    if j >= 0:
+        dx, dy, other = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], disks.angle[j]
+    c, s = cos(angle), sin(angle)
+    return c * dx + s * dy, c * dy - s * dx, angle, other
+
+
+@internal
+def drift(disks: Disks, world: World, look, i: int, j: int) -> float:
+    """m, largest relative motion of any point of the pair since its last test; inf if one body has
+    turned too far (Rapier, relative_pose_drift)."""
+    x, y, angle, other = lie(disks, i, j)
+    if min(cos(angle - look.angle), cos(other - look.other)) <= TURNED:
+        return inf
+    extent = hypot(disks.radius[i], disks.radius[i])  # to a corner of the box around it
+    if j >= 0:
+        extent = max(extent, hypot(disks.radius[j], disks.radius[j]))
+    else:
+        (ax, ay), (bx, by) = world.walls[-1 - j]
+        extent = max(extent, hypot(min(ax, bx), min(ay, by)), hypot(max(ax, bx), max(ay, by)))
+    turned = (other - look.other) - (angle - look.angle)
+    return hypot(x - look.x, y - look.y) + 2.0 * abs(sin(turned / 2.0)) * extent
+
+
+@internal
+def gap_since(disks: Disks, look, i: int, j: int) -> float:
+    """The gap in m along the normal of the last test, between the points that were nearest then and
+    have turned with the disks."""
+    x, (_, _, angle, other) = disks.position, lie(disks, i, j)
+    c, s = cos(look.angle), sin(look.angle)
+    dx, dy = -x[i, 0] + s * look.y - c * look.x, -x[i, 1] - s * look.x - c * look.y
+    if j >= 0:
+        dx, dy = dx + x[j, 0], dy + x[j, 1]
+    gap = look.gap - dx * look.nx - dy * look.ny
+    gap += disks.radius[i] * (1.0 - cos(angle - look.angle))
+    if j >= 0:
+        gap += disks.radius[j] * (1.0 - cos(other - look.other))
+    return gap

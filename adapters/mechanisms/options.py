@@ -14,21 +14,14 @@ from crosscheck2d.adapters.engines import ENGINES, changed
 
 @dataclass(frozen=True)
 class Option:
-    """One change to one engine.
+    """One change to one engine."""
 
-    Attributes:
-        engine: the row of `ENGINES` to compare with, `engine:profile`.
-        change: the difference, in a few words.
-        make: makes the changed engine; imports its library when called.
-    """
-
-    engine: str
-    change: str
-    make: Callable[[], Engine]
+    engine: str  # the row of `ENGINES` to compare with, `engine:profile`
+    change: str  # the difference, in a few words
+    make: Callable[[], Engine]  # makes the changed engine; imports its library when called
 
     @property
     def plain(self) -> Callable[[], Engine]:
-        """The engine without the change."""
         return ENGINES[self.engine].make
 
 
@@ -54,23 +47,16 @@ b2World_EnableWarmStarting, which pyb2d3 does not hand on; no library can disabl
 
 @dataclass(frozen=True)
 class Sweep:
-    """A parameter of an engine over its values: a way to spend time other than smaller steps.
+    """A parameter of an engine over its values: a way to spend time other than smaller steps."""
 
-    Attributes:
-        engine: the row of `ENGINES` whose parameter is swept, `engine:profile`.
-        parameter: what is swept, and its values.
-    """
-
-    engine: str
+    engine: str  # the row of `ENGINES` whose parameter is swept, `engine:profile`
     parameter: AccuracyParameter
 
     @property
     def name(self) -> str:
-        """The engine and a profile that names the swept parameter, see `reports/page/style.py`."""
         return f"{self.engine}+{self.parameter.what}"
 
     def at(self, value: int) -> Callable[[], Engine]:
-        """How to make the engine with this value."""
         return partial(changed, self.engine, **{self.parameter.setting: value})
 
 

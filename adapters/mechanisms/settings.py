@@ -31,7 +31,6 @@ class Setting(NamedTuple):
 
     @property
     def advice(self) -> str:
-        """What to set."""
         to = self.value if isinstance(self.value, str) else f"set {plain(self.value)}"
         return f"`{self.name}` {plain(self.shipped)}; {to}"
 
@@ -46,7 +45,6 @@ class Remedy(NamedTuple):
     tried: tuple[str, ...]
 
     def sentence(self, engine: str) -> str:
-        """What to set, or that nothing helps; "" if the engine has no settings."""
         if self.settings:
             sets = "; ".join(each.advice for each in self.settings)
             return f"{engine.partition(':')[0]}: {sets}"
@@ -55,7 +53,6 @@ class Remedy(NamedTuple):
 
 
 def plain(value: Any) -> str:
-    """A number with three digits; anything else as it is."""
     number = isinstance(value, int | float) and not isinstance(value, bool)
     return f"{value:.3g}" if number else str(value)
 
@@ -108,17 +105,15 @@ def find_remedy(
 
 
 def without_finer(parameters: Mapping[str, Any]) -> tuple[dict[str, Any], int]:
-    """The parameters of `EngineRow.make`, and the steps in place of one."""
     return {name: it for name, it in parameters.items() if name != FINER}, parameters.get(FINER, 1)
 
 
 def off(error: float) -> float:
-    """The error; inf if there is none, because the run failed."""
     return inf if isnan(error) else error
 
 
 def merged(settings: Sequence[Setting]) -> dict[str, Any]:
-    """The parameters of several settings; units of time are multiplied."""
+    # The parameters of several settings; units of time are multiplied.
     parameters = dict[str, Any]()
     for each in settings:
         for name, value in each.parameters.items():
@@ -128,12 +123,10 @@ def merged(settings: Sequence[Setting]) -> dict[str, Any]:
 
 
 def tweak(name: str, shipped: Any, value: Any, *keys: str) -> Setting:
-    """The same of a setting that the matched profile leaves as it is."""
     return one(name, shipped, value, *keys)._replace(matched=False)
 
 
 def one(name: str, shipped: Any, value: Any, *keys: str) -> Setting:
-    """The setting that parameters of `EngineRow.make` of these names set, or of its own name."""
     return Setting(name, shipped, value, dict.fromkeys(keys or [name], value))
 
 
@@ -149,12 +142,10 @@ def _pymunk(scene: Scene, _dt: float) -> list[Setting]:
 
 
 def _unstated(friction: float, scene: Scene) -> list[Setting]:
-    """The friction that a library has where nobody states one."""
     return [] if scene.friction else [one("friction", friction, 0.0)]
 
 
 def _as_box2d(scene: Scene, sleep: str, edge: str, skin: str) -> list[Setting]:
-    """What Box2D 2.3 and planck have in common."""
     return [
         *_unstated(0.2, scene),
         one(sleep, True, False, "sleeping"),
@@ -166,7 +157,7 @@ def _as_box2d(scene: Scene, sleep: str, edge: str, skin: str) -> list[Setting]:
 
 
 def _box2d(scene: Scene, dt: float) -> list[Setting]:
-    """What is compiled in is moved by the units in which the scene is given."""
+    # What is compiled in is moved by the units in which the scene is given.
     from crosscheck2d.adapters.box2d import MATCHED, fastest
 
     threshold = "1 unit of length a unit of time, compiled in", "give times in units of 1000 s"
@@ -187,7 +178,7 @@ def _box2d(scene: Scene, dt: float) -> list[Setting]:
 
 
 def _spin_cap(name: str, most: float, scene: Scene, dt: float) -> list[Setting]:
-    """A cap on the rotation in a step that no setting lifts: only steps that it does not reach."""
+    # A cap on the rotation in a step that no setting lifts: only steps that it does not reach.
     steps = ceil(1.1 * float(np.abs(scene.angular_velocity).max()) * dt / most)
     shorter = f"take steps of {plain(1e3 * dt / max(steps, 1))} ms"
     value = f"{plain(most)} rad a step, compiled in"

@@ -34,20 +34,8 @@ NAMES = (
     "friction of the air",
     "polygons for disks",
 )
-(
-    FLIGHT,
-    RESTITUTION,
-    IMPULSE,
-    RECYCLING,
-    EDGES,
-    FRICTION,
-    SKIN,
-    POSITION_CORRECTION,
-    DIGITS,
-    SWEPT,
-    AIR,
-    SIDES,
-) = NAMES
+FLIGHT, RESTITUTION, IMPULSE, RECYCLING, EDGES, FRICTION = NAMES[:6]
+SKIN, POSITION_CORRECTION, DIGITS, SWEPT, AIR, SIDES = NAMES[6:]
 MANY_SIDES = 800  # of matter's disks, which are polygons: their effect is in the residual
 # Exact flight; bodies that overlap at the end of a step exchange their impulse there; nothing is
 # moved out of overlap.
@@ -68,19 +56,14 @@ COS_AND_SIN = (*ROUNDED_MOVES, "box2d_v3:shipped", "box2d_v3:matched")
 
 @dataclass(frozen=True)
 class Mechanism:
-    """One mechanism by which an engine differs from exact flight with end-of-step detection.
+    """One mechanism by which an engine differs from exact flight with end-of-step detection."""
 
-    Attributes:
-        name: one of `NAMES`.
-        parameters: of `AblatedReference`; empty: the reference does not have the mechanism.
-        on_top: the mechanisms on which it acts, and with which it is enabled.
-        without: makes the engine without it, if the engine has a parameter for that; of a mechanism
-            that the reference does not have, without those before it, too.
-    """
-
-    name: str
+    name: str  # one of `NAMES`
+    # of `AblatedReference`; empty: the reference does not have the mechanism
     parameters: Mapping[str, Any] = field(default_factory=dict)
-    on_top: tuple[str, ...] = ()
+    on_top: tuple[str, ...] = ()  # the mechanisms on which it acts, and with which it is enabled
+    # makes the engine without it, if the engine has a parameter for that; of a mechanism that the
+    # reference does not have, without those before it, too
     without: Callable[[], Engine] | None = None
 
 
@@ -127,7 +110,6 @@ def _lesson(_reported: Mapping[str, Any], _scene: Scene, _dt: float) -> list[Mec
 
 
 def _without(name: str, **changed: Any) -> Callable[[], Engine]:
-    """Makes the engine of a row with these changes."""
     return partial(row_of(name).make, **changed)
 
 
@@ -162,42 +144,15 @@ def _pymunk(reported: Mapping[str, Any], scene: Scene, dt: float, name: str) -> 
 
 
 def _box2d(reported: Mapping[str, Any], scene: Scene, dt: float, name: str) -> list[Mechanism]:
-    cap = reported["speed cap in m/s"] * dt
-    return _as_box2d(
-        name,
-        reported,
-        scene,
-        threshold=reported["restitution threshold in m/s"],
-        slop=reported["linear slop in m"],
-        cap=cap,
-        most=0.1 * cap,  # b2_maxLinearCorrection 0.2 is a tenth of b2_maxTranslation, the cap
-    )
-
-
-def _planck(reported: Mapping[str, Any], scene: Scene, _dt: float, name: str) -> list[Mechanism]:
-    return _as_box2d(
-        name,
-        reported,
-        scene,
-        threshold=reported["velocityThreshold"],
-        slop=reported["linearSlop"],
-        cap=reported["maxTranslation"],
-        most=reported["maxLinearCorrection"],
-    )
-
-
-def _as_box2d(
-    name: str,
-    reported: Mapping[str, Any],
-    scene: Scene,
-    *,
-    threshold: float,
-    slop: float,
-    cap: float,
-    most: float,
-) -> list[Mechanism]:
     """The mechanisms of Box2D 2.3, in float32 and as planck in float64; what is compiled into the
     one is a setting of the other."""
+    if name.startswith("planck"):
+        threshold, slop = reported["velocityThreshold"], reported["linearSlop"]
+        cap, most = reported["maxTranslation"], reported["maxLinearCorrection"]
+    else:
+        threshold, slop = reported["restitution threshold in m/s"], reported["linear slop in m"]
+        cap = reported["speed cap in m/s"] * dt
+        most = 0.1 * cap  # b2_maxLinearCorrection 0.2 is a tenth of b2_maxTranslation, the cap
     without, shipped = partial(_without, name), name.endswith(":shipped")
     velocity, position = (
         int(count) for count in reported["velocity, position iterations"].split(",")
@@ -344,8 +299,8 @@ MECHANISMS: dict[str, Callable[[Mapping[str, Any], Scene, float], list[Mechanism
     "box2d:matched": partial(_box2d, name="box2d:matched"),
     "box2d_v3:shipped": partial(_box2d_v3, name="box2d_v3:shipped"),
     "box2d_v3:matched": partial(_box2d_v3, name="box2d_v3:matched"),
-    "planck:shipped": partial(_planck, name="planck:shipped"),
-    "planck:matched": partial(_planck, name="planck:matched"),
+    "planck:shipped": partial(_box2d, name="planck:shipped"),
+    "planck:matched": partial(_box2d, name="planck:matched"),
     "matter:shipped": partial(_matter, name="matter:shipped"),
     "matter:matched": partial(_matter, name="matter:matched"),
     "rapier2d:shipped": partial(_rapier, name="rapier2d:shipped"),

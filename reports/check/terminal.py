@@ -16,10 +16,9 @@ from crosscheck2d.reports.check.outcomes import OUTCOMES
 from crosscheck2d.reports.check.rows import TASKS, CheckRow
 from crosscheck2d.reports.check.scene_words import faults_of, scene_lines, together
 from crosscheck2d.reports.check.verdict import FileCheck, Tally, headline, named, numbers_of
-from crosscheck2d.reports.terminal.console import Console
+from crosscheck2d.reports.terminal.console import Console, print_table, print_texts, width_of
 from crosscheck2d.reports.terminal.counts import counted
 from crosscheck2d.reports.terminal.foreign_text import legible
-from crosscheck2d.reports.terminal.tables import print_table, print_texts, width_of
 
 if TYPE_CHECKING:
     from crosscheck2d.reports.check.smallest_scene import Smallest

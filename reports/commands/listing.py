@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from crosscheck2d.adapters.engine_row import EngineRow
 from crosscheck2d.adapters.engines import ENGINES, FETCHED, packages
 from crosscheck2d.adapters.npm_packages import missing
-from crosscheck2d.reports.compare.metrics import METRICS, SCALES, Metric
-from crosscheck2d.reports.compare.verdicts import VERDICTS, Kind
+from crosscheck2d.reports.compare.metrics import METRICS
+from crosscheck2d.reports.compare.scales import SCALES
+from crosscheck2d.reports.compare.verdicts import VERDICTS
 from crosscheck2d.reports.lessons.catalogue import LESSONS
 from crosscheck2d.reports.run.arguments import unknown
 from crosscheck2d.reports.stability.cases import CASES
-from crosscheck2d.reports.terminal.console import Console
+from crosscheck2d.reports.terminal.console import Console, print_texts
 from crosscheck2d.reports.terminal.exits import refuse
-from crosscheck2d.reports.terminal.tables import print_texts
 from crosscheck2d.scenarios.catalogue import RANDOM, SCENARIOS, scenario
 from crosscheck2d.scenarios.truth.exact import answered_by
 
@@ -21,16 +20,23 @@ VERSIONS = f"Any version of {', '.join(packages())} plays as NAME@VERSION: --eng
 
 def explain(what: str) -> None:
     """Print a line for everything that has a name, or for all of one kind."""
+    engines, scenarios = {}, {}
+    for name, row in (ENGINES | FETCHED).items():
+        reason = missing(row.package) if row.package else ""
+        engines[name] = f"{row.summary} ({reason})" if reason else row.summary
+    for name in SCENARIOS:
+        scene, drawn = scenario(name), "; random: --seed" if name in RANDOM else ""
+        scenarios[name] = f"{scene.asks} ({answered_by(scene)}{drawn})"
     kinds = {
-        "engines": {name: _engine(row) for name, row in (ENGINES | FETCHED).items()},
-        "scenarios": {name: _line(name) for name in SCENARIOS},
-        "metrics": {_with_unit(name, row): row.summary for name, row in METRICS.items()},
-        "verdicts": {_with_unit(name, row): row.means for name, row in VERDICTS.items()},
+        "engines": engines,
+        "scenarios": scenarios,
+        "metrics": {with_unit(name, row.unit): row.summary for name, row in METRICS.items()},
+        "verdicts": {with_unit(name, row.unit): row.means for name, row in VERDICTS.items()},
         "cases": {name: case.asks for name, case in CASES.items()},
         "lessons": {f"{row.number} {name}": row.asks for name, row in LESSONS.items()},
     }
     if what and what not in kinds:
-        refuse([unknown("list", what, kinds)])
+        refuse(unknown("list", what, kinds))
     console = Console()
     for kind, lines in kinds.items():
         if what in ("", kind):
@@ -42,15 +48,5 @@ def explain(what: str) -> None:
         print_texts(console, SCALES, "Scales, by which errors are divided")
 
 
-def _engine(row: EngineRow) -> str:
-    reason = missing(row.package) if row.package else ""
-    return f"{row.summary} ({reason})" if reason else row.summary
-
-
-def _with_unit(name: str, row: Metric | Kind) -> str:
-    return name if row.unit == "1" else f"{name}, {row.unit}"
-
-
-def _line(name: str) -> str:
-    one = scenario(name)
-    return f"{one.asks} ({answered_by(one)}{'; random: --seed' if name in RANDOM else ''})"
+def with_unit(name: str, unit: str) -> str:
+    return name if unit == "1" else f"{name}, {unit}"

@@ -60,8 +60,6 @@ BOXES = ("canvas.width canvas.height", "WIDTH HEIGHT", "width height", "W H")
 
 
 def write_engine(path: Path, hints: Hints = Hints()) -> None:  # noqa: B008 - a tuple
-    """Write an engine that works, in the language given by the suffix; with hints one around a
-    ball code."""
     kind = kind_of(path)
     if hints == Hints():
         write_new(path, TEMPLATES[kind].read_text(encoding="utf-8"), ENGINE)
@@ -77,11 +75,11 @@ def ported(kind: str, hints: Hints) -> str:
 
     names = (hints.fields or FIELDS).split()
     if len(names) not in (5, 6):
-        refuse([f'--fields "{hints.fields}": must be the names of x, y, vx, vy, radius and mass'])
+        refuse(f'--fields "{hints.fields}": must be the names of x, y, vx, vy, radius and mass')
     fields = [name if name.startswith("[") else f".{name}" for name in names]
     plain = all(name.isidentifier() for name in names)
     if not plain and hints.ball is None:
-        refuse([f'--fields "{hints.fields}": --ball has to say how such a ball is made'])
+        refuse(f'--fields "{hints.fields}": --ball has to say how such a ball is made')
     code = code_in(hints.source, kind)
     if code is None:
         given = {name: value for name, value in hints._asdict().items() if value is not None}
@@ -91,13 +89,13 @@ def ported(kind: str, hints: Hints) -> str:
         hints = hints._replace(box=next((x for x in BOXES if {*x.split()} <= words), None))
     box = (hints.box or "").split()
     if len(box) not in (0, 2):
-        refuse([f'--box "{hints.box}": must be the names of its width and its height'])
+        refuse(f'--box "{hints.box}": must be the names of its width and its height')
     for option, value in (("--pixels", hints.pixels), ("--per-frame", hints.per_frame)):
         if value is not None and not 0 < value < 1e9:
-            refuse([f"{option} {value:g}: must be above 0"])
+            refuse(f"{option} {value:g}: must be above 0")
     move, collide = hints.move or "move", hints.collide or "collide"
     if hints.source is None and (hints.step or not (move + collide).isidentifier()):
-        refuse(["--step, a method or a call as --move or --collide: --from has to name the code"])
+        refuse("--step, a method or a call as --move or --collide: --from has to name the code")
     try:
         restitution, variable = f"{float(hints.restitution or 1):g}", None
     except ValueError:
@@ -143,41 +141,37 @@ def call(name: str, on: list[str], rest: list[str]) -> str:
 
 
 def code_in(source: Path | None, kind: str) -> str | None:
-    """The code in a file; exits 2 if it cannot be read."""
     if source is None:
         return None
     try:
         solver = read_solver(source)
     except NotASolver as refusal:
-        refuse([f"--from {refusal}"])
+        refuse(f"--from {refusal}")
     if solver.kind != kind:
-        refuse([f"--from {source}: is in another language than the file to write"])
+        refuse(f"--from {source}: is in another language than the file to write")
     return solver.text.rstrip()
 
 
 def write_solver(path: Path) -> None:
-    """Write the skeleton of the exercise."""
     write_new(path, EXERCISES[kind_of(path)].read_text(encoding="utf-8"), SOLVER)
 
 
 def kind_of(path: Path) -> str:
-    """The language of a file to write; exits 2 for a name that cannot be one."""
     kind = KINDS.get(path.suffix.lower())
     if kind is None:
-        refuse([f"{path}: ends in {path.suffix or 'nothing'}; name a .js or a .py file"])
+        refuse(f"{path}: ends in {path.suffix or 'nothing'}; name a .js or a .py file")
     if ":" in str(path):
         refuse(faults_of_file(path))
     return kind
 
 
 def write_new(path: Path, text: str, done: str) -> None:
-    """Write a file, and print what to do next; exits 2 if it cannot be written or exists."""
     name = shlex.quote(str(path))
     try:
         with path.open("x", encoding="utf-8") as file:
             file.write(text.replace("THIS_FILE", name))
     except FileExistsError:
-        refuse([f"{path}: exists; name another file"])
+        refuse(f"{path}: exists; name another file")
     except OSError as fault:
-        refuse([f"{path}: {fault.strerror or fault}; name a file that can be written"])
+        refuse(f"{path}: {fault.strerror or fault}; name a file that can be written")
     Console().print(done.format(name), highlight=False, soft_wrap=True)

@@ -13,8 +13,8 @@ from crosscheck2d.adapters.engines import OWN
 from crosscheck2d.reports.check.evidence import lines_and_formula
 from crosscheck2d.reports.check.verdict import check_file
 from crosscheck2d.reports.page.own_solvers import Said, with_lines
-from crosscheck2d.reports.run.plan import Check
 from crosscheck2d.reports.run.pool import Failure, run_all
+from crosscheck2d.reports.run.suite import Check
 from crosscheck2d.reports.terminal.exits import say
 
 CHECKING = 10.0  # s that the game waits for the check of a file, which takes one or two
@@ -30,7 +30,6 @@ def checks_of(engines: Sequence[str]) -> dict[str, Callable[[], Check]]:
 
 
 def checked(path: Path) -> Check:
-    """The check of one file, in few sentences, each with the lines of the file."""
     one = check_file(path)
     shown = [lines_and_formula(row) for row in one.findings]
     return Check(one.passed, one.sentences, shown, one.solver.source if one.solver else "")
@@ -57,7 +56,6 @@ def said_of(engines: Sequence[str]) -> dict[str, list[Said]]:
 
 
 def lines(name: str, sentences: Sequence[str]) -> list[str]:
-    """Lines for a terminal: the file, then its sentences."""
     numbers = [f"{k}. " for k in range(1, len(sentences) + 1)] if len(sentences) > 1 else [""]
     heading = f"{name.removesuffix(OWN)}, by crosscheck check:"
     return [heading, *(f"  {number}{text}" for number, text in zip(numbers, sentences))]

@@ -18,7 +18,6 @@ from crosscheck2d.reports.page import server
 
 
 def application(game: Game) -> Starlette:
-    """The game and the lessons."""
     return server.application([*routes(game), *ROUTES])
 
 

@@ -17,10 +17,9 @@ from crosscheck2d.reports.run.arguments import checked_scenes
 from crosscheck2d.reports.run.comparing import compute_record, no_answer
 from crosscheck2d.reports.run.pool import Failure, run_all
 from crosscheck2d.reports.run.scenes import open_scene
-from crosscheck2d.reports.terminal.console import Console
+from crosscheck2d.reports.terminal.console import Console, print_table, print_texts
 from crosscheck2d.reports.terminal.exits import DONE, FAILED, refuse, say
 from crosscheck2d.reports.terminal.progress import Progress
-from crosscheck2d.reports.terminal.tables import print_table, print_texts
 from crosscheck2d.scenarios.model import Scenario
 from crosscheck2d.scenarios.truth.exact import CLOSED_FORM
 from crosscheck2d.scenarios.truth.record import TWO_PRECISIONS, TruthRecord
@@ -39,7 +38,7 @@ def show_truth(
     (checked,) = checked_scenes([scene], [], False, seed)
     scenario = open_scene(checked, seed)
     if at is not None and not 0 <= at <= scenario.duration:
-        refuse([f"--at {at:g}: must be from 0 to {scenario.duration:g} s, the scene's duration"])
+        refuse(f"--at {at:g}: must be from 0 to {scenario.duration:g} s, the scene's duration")
     # In a worker, which can always be stopped.
     task = partial(compute_record, checked, seed, timeout)
     with Progress() as progress, closing(run_all({checked: task}, 1, timeout)) as results:
@@ -61,7 +60,6 @@ def show_truth(
 def print_answer(
     scenario: Scenario, record: TruthRecord, every: bool, at: float | None, as_json: bool
 ) -> None:
-    """Print the record, or where each disk is `at` s, as JSON or as text."""
     state = None if at is None else state_at(scenario, record, at)
     if as_json:
         written = as_plain(scenario, record) | ({"state": state} if state else {})
@@ -79,7 +77,6 @@ def print_answer(
 
 
 def state_at(scenario: Scenario, record: TruthRecord, at: float) -> dict[str, Any]:
-    """Where each disk is at `at` s, within the horizon, and how it moves."""
     t = np.array([at])
     if record.method == CLOSED_FORM:
         assert scenario.truth is not None
@@ -123,7 +120,6 @@ def as_plain(scenario: Scenario, record: TruthRecord) -> dict[str, Any]:
 
 
 def plain(value: Any) -> Any:
-    """The value in a form that strict JSON can hold: numbers that are not finite as text."""
     if isinstance(value, dict):
         return {key: plain(item) for key, item in value.items()}
     if isinstance(value, list):
@@ -147,17 +143,19 @@ def outcomes(record: TruthRecord) -> list[dict[str, Any]]:
 
 
 def print_truth(scenario: Scenario, record: TruthRecord, every: bool) -> None:
-    """Print the record as text."""
     console = Console()
-    duration = scenario.duration
+    duration, float64 = scenario.duration, min(record.float64_horizon, record.horizon)
     whole = record.horizon >= duration
+    precision = "float64" if record.bits == 53 else f"{record.bits} bits"
+    if record.method == TWO_PRECISIONS and record.bits != 53:
+        precision += f", checked against {record.bits // 2}"
     lines = {
         "scenario": f"{scenario.name}: {scenario.asks}",
         "method": record.method,
-        "precision": precision(record),
-        "horizon": f"{seconds(min(record.horizon, duration))} of {seconds(duration)}",
+        "precision": precision,
+        "horizon": f"{number(min(record.horizon, duration), 6)} s of {number(duration, 6)} s",
         "ends because": record.reason or ("the scenario ends there" if whole else ""),
-        "horizon of float64": seconds(min(record.float64_horizon, record.horizon, duration)),
+        "horizon of float64": f"{number(min(float64, duration), 6)} s",
         "error bound": (
             f"{number(record.error_bound, 2)} m" if record.error_bound else "a rounding of float64"
         ),
@@ -184,23 +182,7 @@ def print_truth(scenario: Scenario, record: TruthRecord, every: bool) -> None:
         print_texts(console, lines, f"Outcome {k} of {len(ends)}; none is the truth")
 
 
-def seconds(t: float) -> str:
-    """A time with its unit."""
-    return f"{number(t, 6)} s"
-
-
-def precision(record: TruthRecord) -> str:
-    """The precision and method of the record."""
-    if record.bits == 53:
-        return "float64"
-    return f"{record.bits} bits" + f", checked against {record.bits // 2}" * (
-        record.method == TWO_PRECISIONS
-    )
-
-
 def rows_of_collisions(record: TruthRecord, every: bool) -> list[list[str]]:
-    """The headings, then the collisions, or the first and the last ten; without the column of
-    angles if it is empty."""
     rows = [list(HEADINGS)]
     for t, i, j, impulse, cosine in record.events.tolist():
         force = f"{impulse:.6g}" if impulse else "comes to rest"
@@ -215,5 +197,4 @@ def rows_of_collisions(record: TruthRecord, every: bool) -> list[list[str]]:
 
 
 def name(j: float) -> str:
-    """The other side of a collision."""
     return f"disk {int(j)}" if j >= 0 else f"wall {-1 - int(j)}"

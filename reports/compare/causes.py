@@ -28,8 +28,6 @@ LATE = "end-of-step detection"  # what is left of an engine without any of its m
 
 
 class CauseKind(StrEnum):
-    """How a cause is known."""
-
     LAW = "law"  # a row of a table: a formula, a source
     SETTING = "setting"  # of the engine: with another value the failure goes
     MECHANISM = "mechanism"  # the reference with it alone has the failure
@@ -55,7 +53,6 @@ class Cause(NamedTuple):
 
     @property
     def told(self) -> str:
-        """The cause and how it was shown."""
         return f"{self.text}: {self.shown}" if self.shown else self.text
 
 
@@ -65,7 +62,6 @@ def unknown(shown: str = "", *tried: str) -> Cause:
 
 
 def by_settings(remedy: Remedy, engine: str, shown: str) -> Cause:
-    """The settings of the engine without which the failure goes."""
     return Cause(CauseKind.SETTING, remedy.sentence(engine), shown=shown)
 
 

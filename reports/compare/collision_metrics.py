@@ -1,26 +1,35 @@
-"""The metrics of collisions: restitution; collisions missed and spurious; detection delay.
+"""The metrics of collisions: restitution; the height of a bounce; collisions missed and spurious;
+detection delay.
 
-Each is a row of `METRICS` (metrics.py).
+Each is a row of `METRICS` (metrics.py), with the sentence that says what it is.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from crosscheck2d.reports.compare.collisions import FAR, by_pair, pair_keys
-from crosscheck2d.reports.compare.faces import SAME, thrown_off
+from crosscheck2d.reports.compare import laws
+from crosscheck2d.reports.compare.collisions import (
+    ALONG,
+    FAR,
+    SAME,
+    by_pair,
+    interval,
+    on_faces,
+    pair_keys,
+    thrown_off,
+)
 from crosscheck2d.reports.compare.restitution import Restitutions
 from crosscheck2d.reports.compare.view import LEAST_SHARE, Value, View, not_judged
+from crosscheck2d.scenarios.model import Array
 
 UNHEARD = not_judged("an engine reports no collisions")
 STICKS = 0.05  # e of a disk that lies is read as less, even if a step is as long as an interval
+LEAST = 5  # sample intervals that the rise to an apex takes; a lower one has too few samples
+FLIES = 0.01  # of g: by so much the acceleration at an apex may differ from it
 
 
 def restitution(view: View) -> Value | None:
-    """Median e = -(dv after).n / (dv before).n over the collisions that can be read off the
-    samples; where gravity leaves a range of e, its value nearest to what the scene states. Where a
-    tenth or more bounce and a tenth or more do not (e below 0.05), the median of those that are
-    farther from what the scene states; the note has the share and the range."""
     read = view.restitutions
     if not len(read.values):
         return _unread(read)
@@ -32,51 +41,112 @@ def restitution(view: View) -> Value | None:
         if LEAST_SHARE <= bounces.mean() <= 1 - LEAST_SHARE:
             groups = [read.values[~bounces], read.values[bounces]]
     medians = [float(np.median(group)) for group in groups]
-    stated = view.scenario.scene.restitution
-    value = _read(max(medians, key=lambda e: abs(e - stated)), read)
-    return value._replace(note=note + value.note)
+    stated = view.scene.restitution
+    return Value(max(medians, key=lambda e: abs(e - stated)), note=note + _read(read))
 
 
 def restitution_error(view: View) -> Value | None:
-    """Largest |e - what the scene states| over the collisions that can be read off the samples,
-    beyond what gravity leaves open."""
     read = view.restitutions
     if not len(read.values):
         return _unread(read)
-    off = np.abs(read.values - view.scenario.scene.restitution)
+    off = np.abs(read.values - view.scene.restitution)
     worst = int(np.argmax(off))
-    return _read(float(off[worst]), read)._replace(at=float(read.times[worst]))
+    return Value(float(off[worst]), at=float(read.times[worst]), note=_read(read))
+
+
+def _read(read: Restitutions) -> str:
+    spread = f", e known to {read.spread.max():.1g}" if read.spread.any() else ""
+    return f"{len(read.values)} collisions read{spread}{_not_read(read)}"
+
+
+def _unread(read: Restitutions) -> Value | None:
+    """Why no collision could be read; None without a collision."""
+    reasons = _not_read(read) + _count(read.unclear, "not alone, too slow, or of an unclear normal")
+    return not_judged(f"no collision read{reasons}") if reasons else None
+
+
+def _not_read(read: Restitutions) -> str:
+    return _count(read.below, "below the floor") + _count(read.unfinished, "not over")
+
+
+def _count(count: int, reason: str) -> str:
+    return f", {count} {reason}" if count else ""
+
+
+def apex_change(view: View) -> Value | None:
+    disks = np.flatnonzero(~view.scene.static)
+    changes = {int(disk): bounce_changes(view, int(disk)) for disk in disks}
+    means = {disk: 100 * float(change.mean()) for disk, change in changes.items() if len(change)}
+    if not means:
+        return None
+    disk = max(means, key=lambda disk: abs(means[disk]))
+    change = 100 * changes[disk]
+    whole = 100 * (np.prod(changes[disk] + 1) - 1)
+    note = f"{len(change)} bounces, from {change.min():+.2g} to {change.max():+.2g} %,"
+    return Value(means[disk], disk, note=f"{note} in all {whole:+.2g} %")
+
+
+def bounce_changes(view: View, disk: int) -> Array:
+    """(m,) for each bounce of a disk on a level wall, with nothing else between two apexes: height
+    after over e2 times the height before, minus 1.
+
+    Heights are those of the disk's lowest point over the wall, at the vertex of the parabola
+    through three samples (`laws.apexes`). If no apex follows by the time at which it is due, the
+    highest sample until then counts: a disk that does not bounce loses all.
+    """
+    scene, played = view.scene, view.played
+    g, h = float(np.linalg.norm(scene.gravity)), interval(played)
+    if not g or not scene.restitution or view.scenario.thrusts or not len(scene.walls):
+        return np.zeros(0)
+    up, e = -scene.gravity / g, scene.restitution
+    y, collisions = played.position[:, disk] @ up, on_faces(played, scene)
+    of_disk = (collisions.i == disk) | (collisions.j == disk)
+    top, vertex = laws.apexes(y)
+    flies = np.abs((y[top - 1] - 2 * y[top] + y[top + 1]) / (g * h**2) + 1) < FLIES
+    top, vertex = top[flies], vertex[flies]
+    changes = []
+    for k, (start, height) in enumerate(zip(played.t[top], vertex)):
+        later = of_disk & (collisions.t > start)
+        times, walls = collisions.t[later], collisions.j[later]
+        if not len(times) or walls[0] >= 0:
+            continue
+        a, b = scene.walls[-1 - walls[0]]
+        level = a @ up + scene.radius[disk]
+        fall = np.sqrt(2 * max(height - level, 0.0) / g)
+        due = times[0] + e * fall
+        tilted = abs((b - a) @ up) > ALONG * laws.lengths(b - a)
+        if tilted or e * fall < LEAST * h or due + h > played.t[-1]:
+            continue
+        until = played.t[top[k + 1]] if k + 1 < len(top) else np.inf
+        follows = not (times[times < until] > times[0] + 2 * h).any() and until < np.inf
+        until = until if follows else due
+        if (walls[times <= until] != walls[0]).any():
+            continue
+        flight = (played.t > times[0]) & (played.t <= due)
+        reached = vertex[k + 1] if follows else y[flight].max()
+        changes.append((reached - level) / (height - level) / e**2 - 1)
+    return np.array(changes)
 
 
 def collision_count_error(view: View) -> Value | None:
-    """Number of collisions minus that of the truth, or of the other engine, at any time; pairs at
-    rest from the start are not counted."""
     if view.silent:
         return UNHEARD
-    resting = pair_keys(view.collisions[1])[view.collisions[1].impulse == 0]
-    counted = (
-        by_pair(collisions, resting, view.end - SAME * view.dt) for collisions in view.collisions
-    )
-    played, true = (len(collisions.t) for collisions in counted)
-    return Value(played - true, note=f"{played} of {true}")
+    played, true = view.collisions
+    resting = pair_keys(true)[true.impulse == 0]  # pairs at rest from the start are not counted
+    counts = [len(by_pair(of, resting, view.end - SAME * view.dt).t) for of in (played, true)]
+    return Value(counts[0] - counts[1], note=f"{counts[0]} of {counts[1]}")
 
 
 def collisions_missed(view: View) -> Value | None:
-    """Collisions of the truth, or of the other engine, that the engine does not have at that time.
-    Collisions closer together than a step can resolve are not counted. Of a pair that collides
-    seldom one counts as found up to half of the time to its next collision; the note has how many
-    are more than 20 steps late or early."""
     if not view.collisions[1].t.size:
         return not_judged("no collision to miss")
     return _unjudged(view) or Value(len(view.matched.missed), note=_carried(view))
 
 
 def collisions_spurious(view: View) -> Value | None:
-    """Collisions of the engine that the truth, or the other engine, does not have at their time;
-    and one if a disk that lies, slides or rolls on a floor of several walls is thrown off it."""
     spurious = len(view.matched.spurious)
-    if view.jumps is not None and view.other is not None:
-        share, at, disk, wall = thrown_off(view.played, view.other, view.scenario.scene)
+    if view.jumps is not None:
+        share, at, disk, wall = thrown_off(view.played, view.reference, view.scene)
         if share > 1.0:
             note = f"thrown off the surface of wall {wall}, where two of its walls meet"
             return Value(spurious + 1, disk, at, note)
@@ -84,7 +154,6 @@ def collisions_spurious(view: View) -> Value | None:
 
 
 def first_wrong_collision_s(view: View) -> Value | None:
-    """Time of the first missed or spurious collision, and its pair; `inf` if there is none."""
     if (unjudged := _unjudged(view)) is not None:
         return unjudged
     at, what = view.matched.first_wrong or (np.nan, "none")
@@ -92,52 +161,24 @@ def first_wrong_collision_s(view: View) -> Value | None:
 
 
 def collision_delay_dt(view: View) -> Value | None:
-    """Median of engine time minus true time of the collisions, in dt; the engine time is the end of
-    the step."""
     delay = view.matched.delay
-    return (
-        Value(float(np.median(delay)) / view.dt, note=f"{len(delay)} collisions")
-        if len(delay)
-        else None
-    )
+    if not len(delay):
+        return None
+    return Value(float(np.median(delay)) / view.dt, note=f"{len(delay)} collisions")
 
 
 def collision_delay_max_dt(view: View) -> Value | None:
-    """Largest difference in time of any collision from the true one, in dt."""
     delay = view.matched.delay
-    return (
-        Value(float(np.abs(delay).max()) / view.dt, note=f"{len(delay)} collisions")
-        if len(delay)
-        else None
-    )
-
-
-def _read(value: float, read: Restitutions) -> Value:
-    spread = f", e known to {read.spread.max():.1g}" if read.spread.any() else ""
-    return Value(value, note=f"{len(read.values)} collisions read{spread}{_unread_ones(read)}")
-
-
-def _unread(read: Restitutions) -> Value | None:
-    """Why no collision could be read; None without a collision."""
-    unclear = _so_many(read.unclear, "not alone, too slow, or of an unclear normal")
-    reasons = _unread_ones(read) + unclear
-    return not_judged(f"no collision read{reasons}") if reasons else None
-
-
-def _unread_ones(read: Restitutions) -> str:
-    """How many collisions were not read, and why."""
-    return _so_many(read.below, "below the floor") + _so_many(read.unfinished, "not over")
-
-
-def _so_many(count: int, why: str) -> str:
-    return f", {count} {why}" if count else ""
+    if not len(delay):
+        return None
+    return Value(float(np.abs(delay).max()) / view.dt, note=f"{len(delay)} collisions")
 
 
 def _carried(view: View) -> str:
     """How many collisions would count as missed if the engine did not have them (collisions.py:
     `match`)."""
     far = int((np.abs(view.matched.delay) > FAR * view.dt).sum())
-    late = _so_many(far, "found more than 20 steps late or early")
+    late = _count(far, "found more than 20 steps late or early")
     return f"{view.matched.judged} of {len(view.collisions[1])} collisions judged{late}"
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,8 +27,6 @@ from crosscheck2d.scenarios.no_truth import answered
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """One scenario, its runs, and the table of their metrics."""
-
     scenario: Scenario
     truth: Trajectory | None  # the exact answer up to its horizon
     runs: Sequence[Run]  # also failed and refused ones, in the order of `ENGINES`, coarse dt first
@@ -41,7 +39,6 @@ class Comparison:
 
     @property
     def middle_runs(self) -> list[Run]:
-        """The runs at the middle dt, failed ones too."""
         return [run for run in self.runs if run.dt == self.middle_dt]
 
 
@@ -54,33 +51,24 @@ def compare(scenario: Scenario, runs: Sequence[Run]) -> Comparison:
     scenario, truth = answered(scenario)
     jumps = None if truth is None else jumps_of(truth, scenario)
     rows: list[TableRow] = []
-    for run in runs:
+    for number, run in enumerate(runs):
         if run.status != "ok":
             rows.append(status_row(run, f"{run.status}: {run.reason}"))
             continue
-        for versus, other, silent in _opponents(run, runs, truth):
-            view = beside(scenario, run, other, jumps if versus == TRUTH else None, silent)
-            rows += _measure(run, view, versus)
+        rows += _measure(run, beside(scenario, run, None, None), ITSELF)
+        if truth is not None:
+            rows += _measure(run, beside(scenario, run, truth, jumps), TRUTH)
+        for other in runs[number + 1 :]:
+            if other.dt == run.dt and other.name != run.name and other.status == "ok":
+                view = beside(scenario, run, other.trajectory, None, other.silent)
+                rows += _measure(run, view, other.name)
         rows += [verdict_row(run, verdict) for verdict in verdicts_on(run, scenario, truth)]
     return Comparison(scenario, truth, tuple(runs), table_of(rows))
 
 
-def _opponents(
-    run: Run, runs: Sequence[Run], truth: Trajectory | None
-) -> Iterator[tuple[str, Trajectory | None, bool]]:
-    """What a run is compared with: name, trajectory, and whether it reports no collisions."""
-    yield ITSELF, None, False
-    if truth is not None:
-        yield TRUTH, truth, False
-    for other in runs[runs.index(run) + 1 :]:
-        if other.dt == run.dt and other.name != run.name and other.status == "ok":
-            yield other.name, other.trajectory, other.silent
-
-
 def _measure(run: Run, view: View, versus: str) -> list[TableRow]:
     """A row for each metric that applies."""
-    kind = versus if versus in (ITSELF, TRUTH) else ENGINE
-    rows = []
+    kind, rows = versus if versus in (ITSELF, TRUTH) else ENGINE, []
     with np.errstate(over="ignore", invalid="ignore"):  # a disk thrown far out gives inf or nan
         for name, metric in METRICS.items():
             if kind in metric.against and (value := metric.of(view)) is not None:

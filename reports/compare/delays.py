@@ -15,13 +15,9 @@ import numpy as np
 from numba import njit
 
 from crosscheck2d.reports.compare import laws
-from crosscheck2d.reports.compare.faces import SAME
+from crosscheck2d.reports.compare.collisions import SAME, WINDOW
 from crosscheck2d.scenarios.model import Array, Scenario, Scene, Trajectory
 
-WINDOW = 10**0.5
-"""dt by which a collision may be late or early: 3.2 steps. It is irrational because collisions
-and samples often lie on the grid of the steps: no multiple of dt, or of a fraction of it, falls on
-the edge, where rounding would decide."""
 # passes of `distance_to_range`; one is exact if all impulses lie along two axes, as in a box
 SWEEPS = 100
 
@@ -70,8 +66,7 @@ def jumps_of(truth: Trajectory, scenario: Scenario) -> Jumps:
     ):
         if not size:  # a contact at rest
             continue
-        other = x[j] if j >= 0 else laws.nearest_on_segment(x[i : i + 1], *scene.walls[-1 - j])[0]
-        normal = (x[i] - other) / np.linalg.norm(x[i] - other)
+        normal = laws.contact_normal(x, scene, i, j)
         impulse = size * normal
         if scene.friction:
             rub, rubbed = friction_of(scenario, t, i, j, normal)

@@ -97,6 +97,5 @@ def plain(value: float, digits: int = 3) -> str:
 
 
 def rounded_down(value: float) -> float:
-    """To one significant digit, downwards."""
     unit = 10.0 ** np.floor(np.log10(value))
     return float(np.floor(value / unit) * unit)

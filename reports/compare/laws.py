@@ -20,29 +20,25 @@ ON_THE_WALL = 1e-9  # radii: more than rounding, in the coordinates of any scene
 
 
 def cached(law: Law) -> Law:
-    """The law with a cache, which is dropped together with the first argument.
+    """The law with a cache, which is dropped together with the first argument; an array is
+    read-only.
 
     Trajectories, scenes and scenarios are frozen, and equal only to themselves. A run is compared
     with every other engine at its dt: without the cache its energy would be computed about forty
     times.
     """
-    known: WeakKeyDictionary[Any, dict[tuple[Any, ...], Any]] = WeakKeyDictionary()
+    cache: WeakKeyDictionary[Any, dict[tuple[Any, ...], Any]] = WeakKeyDictionary()
 
     @wraps(law)
-    def remembered(what: Any, *others: Any) -> Any:
-        found = known.setdefault(what, {})
-        if others not in found:
-            found[others] = read_only(law(what, *others))
-        return found[others]
+    def cached_law(what: Any, *others: Any) -> Any:
+        values = cache.setdefault(what, {})
+        if others not in values:
+            values[others] = value = law(what, *others)
+            if isinstance(value, np.ndarray):
+                value.setflags(write=False)
+        return values[others]
 
-    return cast(Law, remembered)
-
-
-def read_only(value: Any) -> Any:
-    """The same value; an array is made read-only."""
-    if isinstance(value, np.ndarray):
-        value.setflags(write=False)
-    return value
+    return cast(Law, cached_law)
 
 
 @cached
@@ -140,6 +136,13 @@ def nearest_on_segment(x: Array, start: Array, end: Array) -> Array:
     return start + along[:, None] * (end - start)
 
 
+def contact_normal(x: Array, scene: Scene, i: int, j: int) -> Array:
+    """(2,) of length 1: from disk j, or wall -1 - j, to disk i, with the disks at x (n, 2)."""
+    other = x[j] if j >= 0 else nearest_on_segment(x[i : i + 1], *scene.walls[-1 - j])[0]
+    normal: Array = (x[i] - other) / np.linalg.norm(x[i] - other)
+    return normal
+
+
 @cached
 def wall_crossings(trajectory: Trajectory, scene: Scene) -> list[tuple[float, int, int]]:
     """(s, disk, -1 - wall) where the centre of a disk crosses a wall between two samples, on a
@@ -154,7 +157,7 @@ def wall_crossings(trajectory: Trajectory, scene: Scene) -> list[tuple[float, in
     speed = lengths(trajectory.velocity)
     size = np.inf if scene.wrap is None else (scene.wrap[1] - scene.wrap[0]).min()
     known = speed[1:] * np.diff(t)[:, None] < size / 2  # which way it takes round the torus
-    gained, found = lengths(scene.gravity) * np.diff(t[:2]).sum(), []
+    gained, crossings = lengths(scene.gravity) * np.diff(t[:2]).sum(), []
     for w, (a, b) in enumerate(scene.walls):
         side, length = cross(x - a, b - a), lengths(b - a)
         others = np.delete(scene.walls, w, axis=0)
@@ -176,8 +179,8 @@ def wall_crossings(trajectory: Trajectory, scene: Scene) -> list[tuple[float, in
                 most = (t[k + 1] - t[last[k, i]]) * (speed[k : k + 2, i].max() + gained)
                 rounds = zip(gaps, (a - along, b + along))
                 if all(gap < 2 * r or detour(*span, q) > most for gap, q in rounds):
-                    found.append((float(t[k + 1]), int(i), -1 - w))
-    return found
+                    crossings.append((float(t[k + 1]), int(i), -1 - w))
+    return crossings
 
 
 def detour(start: Array, end: Array, around: Array) -> float:
@@ -185,13 +188,12 @@ def detour(start: Array, end: Array, around: Array) -> float:
     return float(lengths(around - start) + lengths(end - around))
 
 
-def apexes(height: Array) -> tuple[np.ndarray, Array]:
+def apexes(y: Array) -> tuple[np.ndarray, Array]:
     """(m,) the highest sample of each flight, and (m,) m, the vertex of the parabola through it and
     the two beside it; of the first flight, which may begin with a drop, through its first three.
 
-    `height`: (k,) m of a disk. A flight with fewer samples is left out.
+    `y`: (k,) m, the height of a disk. A flight with fewer samples is left out.
     """
-    y = height
     top = np.flatnonzero((y[1:-1] >= y[:-2]) & (y[1:-1] > y[2:])) + 1
     top = np.concatenate([[1], top[top > 1]]) if len(y) > 2 else top
     before, at, after = y[top - 1], y[top], y[top + 1]

@@ -84,7 +84,6 @@ def verdict_of(errors: Array, changes: Array) -> str:
 
 
 def slope(x: Array, y: Array) -> float:
-    """The slope of the straight line of least squares."""
     x = x - x.mean()
     return float(x @ y / (x @ x))
 

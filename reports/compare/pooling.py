@@ -107,7 +107,6 @@ def without_idle(cost: Array, idle: Array) -> Array:
 
 
 def finite_or_nan(value: float) -> float:
-    """The value; nan where it is infinite."""
     return float(value) if np.isfinite(value) else float("nan")
 
 

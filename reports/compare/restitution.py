@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from crosscheck2d.reports.compare import laws
-from crosscheck2d.reports.compare.faces import SAME, interval, on_faces
+from crosscheck2d.reports.compare.collisions import SAME, interval, on_faces
 from crosscheck2d.scenarios.model import Array, Scene, Trajectory
 
 
@@ -145,7 +145,6 @@ class Pairs(NamedTuple):
     when: Array
 
     def of(self, chosen: np.ndarray) -> Pairs:
-        """Those that a mask or indices choose."""
         return Pairs(*(column[chosen] for column in self))
 
     @property

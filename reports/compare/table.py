@@ -15,27 +15,17 @@ from crosscheck2d.reports.compare.verdicts import Verdict
 from crosscheck2d.reports.compare.view import Value
 
 COLUMNS = (
-    "scenario",
-    "engine",
-    "profile",
-    "dt_s",
-    "metric",
-    "disk",
-    "value",
-    "unit",
-    "versus",
-    "at_s",
-    "note",
-    "bound",
+    *("scenario", "engine", "profile", "dt_s"),
+    *("metric", "disk", "value", "unit", "versus", "at_s", "note", "bound"),
 )
 TableRow = tuple[str, str, str, float, str, int, float, str, str, float, str, float]  # as `COLUMNS`
 
 
 def deviation_row(run: Run, metric: str, value: Value, unit: str, versus: str) -> TableRow:
     """The row of one metric of a run; what is judged and no number is infinitely far off."""
-    whose = (run.scenario, run.engine, run.profile, run.dt, metric)
     number = np.inf if value.judged and np.isnan(value.value) else value.value
-    return (*whose, value.disk, number, unit, versus, value.at, value.note, np.nan)
+    cell = (run.scenario, run.engine, run.profile, run.dt)
+    return (*cell, metric, value.disk, number, unit, versus, value.at, value.note, np.nan)
 
 
 def verdict_row(run: Run, verdict: Verdict) -> TableRow:
@@ -46,11 +36,10 @@ def verdict_row(run: Run, verdict: Verdict) -> TableRow:
     return (*deviation_row(run, verdict.id, value, verdict.unit, ITSELF)[:-1], verdict.bound)
 
 
-def status_row(run: Run, why: str, versus: str = ITSELF) -> TableRow:
+def status_row(run: Run, reason: str, versus: str = ITSELF) -> TableRow:
     """The row of a run without numbers, with the reason."""
-    return deviation_row(run, "status", Value(np.nan, note=why, judged=False), "", versus)
+    return deviation_row(run, "status", Value(np.nan, note=reason, judged=False), "", versus)
 
 
 def table_of(rows: Sequence[TableRow]) -> pd.DataFrame:
-    """The rows as a table with `COLUMNS`."""
     return pd.DataFrame(rows, columns=list(COLUMNS))

@@ -28,10 +28,10 @@ from numpy.typing import NDArray
 
 from crosscheck2d.adapters.engine_row import FLOAT64
 from crosscheck2d.adapters.run import Run
-from crosscheck2d.reports.compare import laws, scales, violations
+from crosscheck2d.reports.compare import laws, scales
 from crosscheck2d.reports.compare.against import ITSELF
 from crosscheck2d.reports.compare.restitution import TINY
-from crosscheck2d.reports.compare.view import View, rounding_of
+from crosscheck2d.reports.compare.view import rounding_of
 from crosscheck2d.scenarios.model import Array, Scenario, Trajectory
 
 MOST_OVERLAP = 0.1  # radii, beyond what disks approach in two steps
@@ -93,17 +93,14 @@ class Verdict:
 
     @property
     def failed(self) -> bool:
-        """Whether the run fails."""
         return not self.value <= self.bound
 
     @property
     def unit(self) -> str:
-        """The unit of the value."""
         return VERDICTS[self.id].unit
 
     @property
     def text(self) -> str:
-        """What is said of a run that fails it."""
         return self.event or in_words(self.id, self.value)
 
 
@@ -129,25 +126,16 @@ def verdicts(
 
 
 def verdicts_on(run: Run, scenario: Scenario, truth: Trajectory | None) -> list[Verdict]:
-    """The verdicts on a run that was played to its end."""
     assert run.trajectory is not None
     return verdicts(scenario, run.trajectory, run.dt, rounding_of(run.name), truth)
 
 
 def first_failed(run: Run, scenario: Scenario, truth: Trajectory | None) -> Verdict | None:
-    """The first verdict that the run fails."""
-    return next((each for each in verdicts_on(run, scenario, truth) if each.failed), None)
-
-
-def failures(table: pd.DataFrame) -> dict[tuple[str, float], str]:
-    """(`engine:profile`, dt in s) -> the first verdict that fails in deviations.csv, in words."""
-    rows = fails(table)[::-1]  # of several the first stays
-    names = zip(rows.engine + ":" + rows.profile, rows.dt_s.astype(float))
-    return dict(zip(names, map(in_words, rows.metric, rows.value.astype(float))))
+    judged = verdicts_on(run, scenario, truth)
+    return next((verdict for verdict in judged if verdict.failed), None)
 
 
 def fails(table: pd.DataFrame) -> pd.DataFrame:
-    """The rows of deviations.csv of failed verdicts."""
     return table[
         (table.versus == ITSELF) & table.metric.isin(list(VERDICTS)) & ~(table.value <= table.bound)
     ]
@@ -160,8 +148,8 @@ def in_words(kind: str, value: float) -> str:
 
 
 class Pair(NamedTuple):
-    """A disk beside others, or beside a wall: who they are (m,), their overlap (k, m) in m, the
-    way between their centres (k, m, 2) m, and the radius (m,) of the smaller disk."""
+    """A disk beside m others, or beside one wall w, -1 - w: their numbers (m,); their overlap
+    (k, m) in m; the way between their centres (k, m, 2) m; the radius (m,) of the smaller disk."""
 
     disk: int
     others: NDArray[np.int64]
@@ -172,8 +160,6 @@ class Pair(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Judge:
-    """The arguments of `verdicts`, and what several of them need."""
-
     scenario: Scenario
     played: Trajectory
     dt: float
@@ -215,7 +201,7 @@ class Judge:
     @cached_property
     def pairs(self) -> list[Pair]:
         """Every disk beside those after it, and every moving disk beside a wall."""
-        scene, x, found = self.scenario.scene, self.played.position, []
+        scene, x, pairs = self.scenario.scene, self.played.position, []
         r, static = scene.radius, scene.static
         for i in range(scene.n - 1):
             others = np.flatnonzero(~(static & static[i]))
@@ -223,26 +209,25 @@ class Judge:
                 continue
             way = x[:, others] - x[:, i, None]
             overlap = r[i] + r[others] - laws.lengths(way)
-            found.append(Pair(i, others, overlap, way, np.minimum(r[i], r[others])))
+            pairs.append(Pair(i, others, overlap, way, np.minimum(r[i], r[others])))
         for w, (start, end) in enumerate(scene.walls):
             for disk in np.flatnonzero(~static).tolist():
                 to_wall = laws.nearest_on_segment(x[:, disk], start, end) - x[:, disk]
                 depth, wall = r[disk] - laws.lengths(to_wall), np.array([-1 - w])
-                found.append(Pair(disk, wall, depth[:, None], to_wall[:, None], r[[disk]]))
-        return found
+                pairs.append(Pair(disk, wall, depth[:, None], to_wall[:, None], r[[disk]]))
+        return pairs
 
     # Contacts: through something, or in it.
 
     def contacts(self) -> Iterator[Verdict]:
-        """`tunnelled` and `overlap`."""
         if not self.pairs:
             return
         crossings = laws.wall_crossings(self.played, self.scenario.scene)
         passed = sorted([*crossings, *self.through_disks()])
         disks = len({disk for _, disk, _ in passed})
-        at, *who = passed[0] if passed else (np.nan,)
-        yield Verdict("tunnelled", disks, 0.0, at, tuple(map(int, who)))
-        yield max(map(self.overlap, self.pairs), key=lambda each: each.value - each.bound)
+        at, *both = passed[0] if passed else (np.nan,)
+        yield Verdict("tunnelled", disks, 0.0, at, tuple(map(int, both)))
+        yield max(map(self.overlap, self.pairs), key=lambda verdict: verdict.value - verdict.bound)
 
     def through_disks(self) -> Iterator[tuple[float, int, int]]:
         """(s, disk, disk): between two samples two disks change sides, and the centre of one passes
@@ -304,47 +289,48 @@ class Judge:
         A right engine that detects collisions at the end of a step overlaps by the approach in it:
         a fast disk in a narrow gap at every sample.
         """
-        depth, number = pair.overlap / pair.smaller, np.arange(len(self.played))[:, None]
-        seen = np.flatnonzero((depth > 0).any(axis=0))
-        if not len(seen):
+        touching = np.flatnonzero((pair.overlap > 0).any(axis=0))
+        if not len(touching):
             return Verdict("overlap", 0.0, MOST_OVERLAP)
-        depth, allowed = depth[:, seen], MOST_OVERLAP + np.zeros((len(depth), len(seen)))
-        allowed += 2 * self.dt * self.speed[:, None] / pair.smaller[seen]
-        v, way = self.played.velocity, pair.way[:, seen]
-        v = (v[:, pair.others[seen]] if pair.others[0] >= 0 else 0.0) - v[:, [pair.disk]]
-        nears = np.abs((v * way).sum(axis=2)) / np.maximum(laws.lengths(way), TINY)
-        nears, stays = least_of_three(nears) / pair.smaller[seen], least_of_three(depth)
-        moves = nears * self.interval > stays  # else they lie in each other, whatever the speed
-        bound = MOST_OVERLAP + np.where(moves, 2 * self.dt * nears, 0.0)
-        lasting = (depth[2:] >= STAYS * depth[:-2]) & (stays > bound)
-        allowed[2:] = np.where(lasting, bound, allowed[2:])
-        depth[2:] = np.where(lasting, stays, depth[2:])
+        others, smaller, way = pair.others[touching], pair.smaller[touching], pair.way[:, touching]
+        depth = pair.overlap[:, touching] / smaller
+        allowed = MOST_OVERLAP + 2 * self.dt * self.speed[:, None] / smaller
+        v = self.played.velocity
+        v = (v[:, others] if others[0] >= 0 else 0.0) - v[:, [pair.disk]]
+        speed = np.abs((v * way).sum(axis=2)) / np.maximum(laws.lengths(way), TINY)
+        slowest, least = least_of_three(speed) / smaller, least_of_three(depth)
+        moves = slowest * self.interval > least  # else they lie in each other, whatever the speed
+        bound = MOST_OVERLAP + np.where(moves, 2 * self.dt * slowest, 0.0)
+        stays = (depth[2:] >= STAYS * depth[:-2]) & (least > bound)
+        allowed[2:] = np.where(stays, bound, allowed[2:])
+        depth[2:] = np.where(stays, least, depth[2:])
         if self.jumps.any():
             # not one that they are set into: they were apart after the last jump of either
-            ends = np.where(pair.others >= 0, pair.others, pair.disk)[seen]
+            ends = np.where(others >= 0, others, pair.disk)
             jumped = np.vstack([depth[:1] < 0, self.jumps[:, [pair.disk]] | self.jumps[:, ends]])
-            last = [np.where(event, number, -1) for event in (depth <= 0, jumped)]
-            apart, jump = (np.maximum.accumulate(each) for each in last)
+            number = np.arange(len(depth))[:, None]
+            apart, jump = (
+                np.maximum.accumulate(np.where(event, number, -1)) for event in (depth <= 0, jumped)
+            )
             depth = np.where(apart >= jump, depth, 0.0)
         k, m = np.unravel_index(int(np.argmax(depth - allowed)), depth.shape)
-        above = ~(depth[:, m] <= allowed[:, m])
+        value, most, above = depth[k, m], allowed[k, m], ~(depth[:, m] <= allowed[:, m])
         at = self.played.t[np.argmax(above) if above.any() else k]
-        who, value = (pair.disk, int(pair.others[seen[m]])), max(float(depth[k, m]), 0.0)
-        return Verdict("overlap", value, float(allowed[k, m]), float(at), who)
+        disks = pair.disk, int(others[m])
+        return Verdict("overlap", max(float(value), 0.0), float(most), float(at), disks)
 
     # Energy and momentum.
 
     def energy(self) -> Iterator[Verdict]:
-        """`energy_gained`, `energy_lost` where energy is conserved, `bounce_gained`."""
         scenario, t = self.scenario, self.played.t
-        if scenario.thrusts or violations.lifts(scenario):
+        if scenario.thrusts or scales.lifts(scenario):
             return
         scale = scales.energy(scenario) or 1.0
         energy = laws.energy(self.played, scenario.scene)
         known = laws.half_step(self.played, scenario.scene, self.dt) / scale
         gained = (energy - energy[0]) / scale
         yield worst_of("energy_gained", t[2:], least_of_three(gained - known), MOST_RISE)
-        if violations.keeps_energy(scenario):
+        if scales.keeps_energy(scenario):
             # what never comes back: a soft contact holds energy while it lasts
             best = np.maximum.accumulate((gained + known)[::-1])[::-1][: len(t) - len(t) // 10]
             yield worst_of("energy_lost", t, -best, MOST_RISE)
@@ -374,7 +360,7 @@ class Judge:
     def flight(self) -> Iterator[Verdict]:
         """`momentum` where the outer forces are known, and `gravity` where disks touch nothing."""
         scenario, t = self.scenario, self.played.t
-        off = violations.momentum(View(scenario, self.dt, self.played))
+        off = scales.unexplained_momentum(scenario, self.played)
         if off is not None:
             # each step rounds each velocity once; free fall adds to the momentum at hand
             momenta = laws.lengths(laws.momenta(self.played, scenario.scene)).sum(axis=1).max()
@@ -464,9 +450,9 @@ class Judge:
         way = self.played.position[first:] - self.played.position[first]
         down, across = scene.gravity / self.g, scene.gravity[::-1] * (1, -1) / self.g
         bound = MOST_SINKING + step**2 / 2
-        of = {"sinks": way @ down, "hops": -way @ down, "creeps": np.abs(way @ across)}
-        for kind, moved in of.items():
-            series = moved / scene.radius
+        ways = {"sinks": way @ down, "hops": -way @ down, "creeps": np.abs(way @ across)}
+        for kind, distance in ways.items():
+            series = distance / scene.radius
             yield worst_of(kind, t, series.max(axis=1), bound, series)
 
 

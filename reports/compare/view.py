@@ -12,18 +12,23 @@ from crosscheck2d.adapters.engine_row import FLOAT64
 from crosscheck2d.adapters.engines import known_row
 from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.compare import laws
-from crosscheck2d.reports.compare.collisions import Matched, match
-from crosscheck2d.reports.compare.delays import (
+from crosscheck2d.reports.compare.collisions import (
+    SAME,
     WINDOW,
+    Matched,
+    interval,
+    match,
+    on_faces,
+)
+from crosscheck2d.reports.compare.delays import (
     Jumps,
     collision_free,
     energy_range,
     momentum_outside,
     nearest_velocity,
 )
-from crosscheck2d.reports.compare.faces import SAME, interval, on_faces
 from crosscheck2d.reports.compare.restitution import Restitutions, effective_restitution
-from crosscheck2d.scenarios.model import Array, Collisions, Scenario, Trajectory
+from crosscheck2d.scenarios.model import Array, Collisions, Scenario, Scene, Trajectory
 
 # sample intervals of falling, times (1 + e) / 2: e is known to a tenth even if a step is as long as
 # an interval; irrational, so that no closing speed equals the threshold
@@ -47,10 +52,10 @@ class Value(NamedTuple):
     judged: bool = True
 
 
-def not_judged(why: str) -> Value:
+def not_judged(reason: str) -> Value:
     """The value of a metric that applies, but for which too few samples or collisions are
     judged."""
-    return Value(np.nan, note=f"{NOT_JUDGED}: {why}", judged=False)
+    return Value(np.nan, note=f"{NOT_JUDGED}: {reason}", judged=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,11 +80,22 @@ class View:
     rounding: float = FLOAT64
     silent: bool = False
 
+    @property
+    def scene(self) -> Scene:
+        return self.scenario.scene
+
+    @property
+    def reference(self) -> Trajectory:
+        """`other`, in a view that has one."""
+        assert self.other is not None
+        return self.other
+
     @cached_property
     def deviation(self) -> Array:
         """(k, n) m between the two."""
-        assert self.other is not None
-        return laws.deviation(self.played, self.other, self.scenario.scene)
+        return laws.deviation(self.played, self.reference, self.scene)
+
+    # Which samples are compared.
 
     @cached_property
     def judged(self) -> np.ndarray:
@@ -90,13 +106,11 @@ class View:
         collision that the truth has only after its end. With another engine, where either may be
         late: if that disk has no collision within `WINDOW` dt in either trajectory.
         """
-        assert self.other is not None
-        played, moving = self.played, ~self.scenario.scene.static
         if self.jumps is None:
-            free = collision_free(played, self.dt) & collision_free(self.other, self.dt)
-            judged: np.ndarray = free & moving
+            free = collision_free(self.played, self.dt) & collision_free(self.reference, self.dt)
         else:
-            judged = (played.t < self.other.t[-1] - WINDOW * self.dt)[:, None] & moving
+            free = (self.played.t < self.reference.t[-1] - WINDOW * self.dt)[:, None]
+        judged: np.ndarray = free & ~self.scene.static
         judged[0] = False
         return judged
 
@@ -105,85 +119,66 @@ class View:
         """(k, n) bool, where the spin of a disk is compared: where its velocity is, and with
         friction, which changes spins, only if the disk has no collision within `WINDOW` dt in the
         truth either."""
-        assert self.other is not None
-        if not self.scenario.scene.friction:
+        if not self.scene.friction:
             return self.judged
-        judged: np.ndarray = self.judged & collision_free(self.other, self.dt)
+        judged: np.ndarray = self.judged & collision_free(self.reference, self.dt)
         return judged
 
     def share(self, judged: np.ndarray) -> float:
         """The fraction of the samples after the start, disk by disk, that are `judged` (k, n)."""
-        every = (len(self.played) - 1) * int((~self.scenario.scene.static).sum())
+        every = (len(self.played) - 1) * int((~self.scene.static).sum())
         return float(judged.sum() / every) if every else 0.0
 
     def carried(self, judged: np.ndarray) -> str:
         """How many of the samples are `judged` (k, n), in words."""
-        samples, moving = len(self.played) - 1, int((~self.scenario.scene.static).sum())
+        samples, moving = len(self.played) - 1, int((~self.scene.static).sum())
         whole = judged.any(axis=1)
         if self.jumps is not None and judged.sum() == whole.sum() * moving:
             return f"{whole.sum()} of {samples} samples"
         return f"{judged.sum()} of {samples * moving} samples of a disk"
 
+    # Differences, with the detection delay allowed for if the other is the truth; nan where nothing
+    # is judged. Beside an engine momentum and energy are summed over the judged disks only.
+
     @cached_property
     def velocity_deviation(self) -> Array:
-        """(k, n) m/s between the two, with the detection delay allowed for if the other is the
-        truth; nan where not judged."""
-        assert self.other is not None
-        expected = self.other.velocity
+        """(k, n) m/s."""
+        expected = self.reference.velocity
         if self.jumps is not None:
-            expected = nearest_velocity(self.played, self.other, self.jumps, self.dt)
+            expected = nearest_velocity(self.played, self.reference, self.jumps, self.dt)
         return np.where(self.judged, laws.lengths(self.played.velocity - expected), np.nan)
 
     @cached_property
-    def angular_velocity_deviation(self) -> Array:
-        """(k, n) rad/s between the two."""
-        assert self.other is not None
-        return np.abs(self.played.angular_velocity - self.other.angular_velocity)
+    def momentum_deviation(self) -> Array:
+        """(k,) kg m/s."""
+        played, reference, scene = self.played, self.reference, self.scene
+        if self.jumps is None:
+            difference = laws.momenta(played, scene) - laws.momenta(reference, scene)
+            return laws.lengths(self._sum_judged(difference))
+        off = momentum_outside(played, reference, self.jumps, self.dt, scene)
+        return np.where(self.judged.any(axis=1), off, np.nan)
 
     @cached_property
-    def momentum_deviation(self) -> Array:
-        """(k,) kg m/s between the momenta of the two, with the detection delay allowed for if the
-        other is the truth; nan if not judged.
-
-        Beside an engine the sum is over the judged disks only.
-        """
-        assert self.other is not None
-        if self.jumps is not None:
-            off = momentum_outside(
-                self.played, self.other, self.jumps, self.dt, self.scenario.scene
-            )
-            return np.where(self.judged.any(axis=1), off, np.nan)
-        momenta = (laws.momenta(one, self.scenario.scene) for one in (self.played, self.other))
-        return laws.lengths(self._summed(next(momenta) - next(momenta)))
+    def energy_deviation(self) -> Array:
+        """(k,) J, energy of the engine minus that of the other."""
+        played, reference, scene = self.played, self.reference, self.scene
+        if self.jumps is None:
+            return self._sum_judged(laws.energies(played, scene) - laws.energies(reference, scene))
+        energy = laws.energy(played, scene)
+        off = energy - np.clip(energy, *self.energy_range)
+        return np.where(self.judged.any(axis=1), off, np.nan)
 
     @cached_property
     def energy_range(self) -> tuple[Array, Array]:
         """((k,), (k,)) J, the least and the largest energy that the truth allows within the
         detection delay."""
-        assert self.other is not None
         assert self.jumps is not None
-        return energy_range(self.played, self.other, self.jumps, self.dt, self.scenario.scene)
+        return energy_range(self.played, self.reference, self.jumps, self.dt, self.scene)
 
-    @cached_property
-    def energy_deviation(self) -> Array:
-        """(k,) J, energy of the engine minus that of the other, as in `momentum_deviation`."""
-        assert self.other is not None
-        if self.jumps is not None:
-            energy, (low, high) = laws.energy(self.played, self.scenario.scene), self.energy_range
-            return np.where(self.judged.any(axis=1), energy - np.clip(energy, low, high), np.nan)
-        energies = (laws.energies(one, self.scenario.scene) for one in (self.played, self.other))
-        return self._summed(next(energies) - next(energies))
-
-    def _summed(self, difference: Array) -> Array:
-        """The sum over the judged disks of (k, n, ...); nan where none is judged."""
+    def _sum_judged(self, difference: Array) -> Array:
+        """The sum over the judged disks of (k, n, ...)."""
         judged = self.judged.reshape(*self.judged.shape, *[1] * (difference.ndim - 2))
         return np.where(judged.any(axis=1), np.where(judged, difference, 0.0).sum(axis=1), np.nan)
-
-    @cached_property
-    def angle_deviation(self) -> Array:
-        """(k, n) rad between the two."""
-        assert self.other is not None
-        return np.abs(self.played.angle - self.other.angle)
 
     @cached_property
     def collision_free_samples(self) -> np.ndarray:
@@ -193,14 +188,16 @@ class View:
         Used by the error budget, which subtracts runs. Not for a metric: in a crowd only the start
         would be left.
         """
-        free = np.ones(len(self.played), bool)
-        if self.other is not None and len(collisions := self.other.collisions.t):
-            nearest = np.searchsorted(collisions, self.played.t)
-            before = self.played.t - collisions[np.maximum(nearest - 1, 0)]
-            after = collisions[np.minimum(nearest, len(collisions) - 1)] - self.played.t
+        free, t = np.ones(len(self.played), bool), self.played.t
+        if len(collisions := self.reference.collisions.t):
+            following = np.searchsorted(collisions, t)
+            before = t - collisions[np.maximum(following - 1, 0)]
+            after = collisions[np.minimum(following, len(collisions) - 1)] - t
             free = np.minimum(np.abs(before), np.abs(after)) > WINDOW * self.dt
             free[0] = True
         return free
+
+    # Collisions.
 
     @cached_property
     def restitutions(self) -> Restitutions:
@@ -211,27 +208,23 @@ class View:
         """
         if self.scenario.thrusts:
             return Restitutions(np.zeros(0), np.zeros(0), np.zeros(0), 0, 0)
-        scene = self.scenario.scene
-        slowest = SLOWEST * (1 + scene.restitution) / 2 * self.scenario.sample_interval
-        slowest *= float(np.linalg.norm(scene.gravity))
-        return effective_restitution(self.played, scene, self.dt, slowest, self.rounding)
+        slowest = SLOWEST * (1 + self.scene.restitution) / 2 * self.scenario.sample_interval
+        slowest *= float(np.linalg.norm(self.scene.gravity))
+        return effective_restitution(self.played, self.scene, self.dt, slowest, self.rounding)
 
     @cached_property
     def collisions(self) -> tuple[Collisions, Collisions]:
         """The collisions of the engine and of the other, by what a disk can distinguish
-        (faces.py)."""
-        assert self.other is not None
-        return on_faces(self.played, self.scenario.scene), on_faces(self.other, self.scenario.scene)
+        (`on_faces`)."""
+        return on_faces(self.played, self.scene), on_faces(self.reference, self.scene)
 
     @property
     def end(self) -> float:
         """s, the last common sample."""
-        assert self.other is not None
-        return float(min(self.played.t[-1], self.other.t[-1]))
+        return float(min(self.played.t[-1], self.reference.t[-1]))
 
     @cached_property
     def matched(self) -> Matched:
-        """The collisions of the two, matched."""
         return match(*self.collisions, self.end, self.dt)
 
 
@@ -246,11 +239,9 @@ def beside(
     collisions."""
     assert run.trajectory is not None
     k = len(run.trajectory) if other is None else min(len(run.trajectory), len(other))
-    other = None if other is None else cut(other, k)
+    other, played = None if other is None else cut(other, k), cut(run.trajectory, k)
     silent = silent or run.silent
-    return View(
-        scenario, run.dt, cut(run.trajectory, k), other, jumps, rounding_of(run.name), silent
-    )
+    return View(scenario, run.dt, played, other, jumps, rounding_of(run.name), silent)
 
 
 def rounding_of(name: str) -> float:
@@ -266,14 +257,13 @@ def cut(trajectory: Trajectory, k: int) -> Trajectory:
         return trajectory
     # Steps, and so collisions, lie on the grid of the samples: a collision at the last of them is
     # kept, however it rounds.
-    found = trajectory.collisions
-    early = found.t <= trajectory.t[k - 1] + SAME * interval(trajectory)
+    collisions = trajectory.collisions
+    early = collisions.t <= trajectory.t[k - 1] + SAME * interval(trajectory)
+    arrays = ("t", "position", "velocity", "angle", "angular_velocity")
     return replace(
         trajectory,
-        t=trajectory.t[:k],
-        position=trajectory.position[:k],
-        velocity=trajectory.velocity[:k],
-        angle=trajectory.angle[:k],
-        angular_velocity=trajectory.angular_velocity[:k],
-        collisions=Collisions(found.t[early], found.i[early], found.j[early], found.impulse[early]),
+        **{name: getattr(trajectory, name)[:k] for name in arrays},
+        collisions=Collisions(
+            *(getattr(collisions, name)[early] for name in ("t", "i", "j", "impulse"))
+        ),
     )

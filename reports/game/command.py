@@ -14,8 +14,8 @@ from crosscheck2d.adapters.host.engine import GuestEngine, row_of_file
 from crosscheck2d.adapters.host.file import KINDS
 from crosscheck2d.adapters.host.restitution import EXERCISE
 from crosscheck2d.reports.game.flight import FRAME, field_scenario
-from crosscheck2d.reports.game.messages import MOST_ENGINES
 from crosscheck2d.reports.game.server import Game
+from crosscheck2d.reports.game.session import MOST_ENGINES
 from crosscheck2d.reports.run.arguments import checked_engines
 from crosscheck2d.reports.terminal.exits import refuse
 from crosscheck2d.scenarios.files.scene_file import SceneFileError, read_scene_file
@@ -69,11 +69,9 @@ def own_rows(names: Sequence[str]) -> tuple[dict[str, EngineRow], float]:
 
 
 def read_flight(path: Path) -> Scenario:
-    """The scenario in a scene file; exits 2 with a line for each fault."""
     if path.suffix.lower() in KINDS:
-        refuse(
-            [f"{path}: is a solver, not a flight; fly it with --engine {shlex.quote(str(path))}"]
-        )
+        flag = f"--engine {shlex.quote(str(path))}"
+        refuse([f"{path}: is a solver, not a flight; fly it with {flag}"])
     try:
         scenario = read_scene_file(path)
     except SceneFileError as error:

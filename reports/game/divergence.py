@@ -32,12 +32,10 @@ class FirstCollision(NamedTuple):
 
     @property
     def pair(self) -> frozenset[int]:
-        """What collided."""
         return frozenset((self.i, self.j))
 
     @property
     def disks(self) -> set[int]:
-        """Its disks, without a wall."""
         return {disk for disk in (self.i, self.j) if disk >= 0}
 
 
@@ -60,13 +58,8 @@ class Drift(NamedTuple):
 
 
 class Divergence(NamedTuple):
-    """Where a ghost diverged from the solid ship's engine, and what happened there.
-
-    Attributes:
-        at: the collision; the edge that a ship left the field by; or where there was neither.
-        solid: the engine that was solid then.
-        only: the engine in which alone it happened; "": in both.
-    """
+    """Where a ghost diverged from the engine that was solid then, and what happened there; `only`:
+    the engine in which alone it happened, "" in both."""
 
     at: FirstCollision | Edge | Drift
     solid: str
@@ -98,16 +91,18 @@ class Touches:
         Where two disks touched is found from `before`: afterwards a faulty solver may have thrown
         them across the field.
         """
-        self.recent = [one for one in self.recent if one.frame >= frame - WAIT]
-        struck = {disk for one in self.recent if one.frame == frame for disk in one.disks}
+        self.recent = [touch for touch in self.recent if touch.frame >= frame - WAIT]
+        struck = {disk for touch in self.recent if touch.frame == frame for disk in touch.disks}
         for collision in collisions:
             i, j = (collision.i, collision.j) if collision.i >= 0 else (collision.j, collision.i)
             self.count += self.begins(collision)
             t = self.since + (collision.step + 1) * self.dt
             if not {i, max(i, j)} <= struck:
                 position = before.position + (t - began) * before.velocity
-                place = contact(position, self.radius, i, j)
-                self.recent.append(FirstCollision(t, frame, i, j, *place))
+                # of a wall, only the disk's centre is known here
+                share = self.radius[i] / (self.radius[i] + self.radius[j]) if j >= 0 else 0.0
+                place = position[i] + share * (position[max(j, 0)] - position[i])
+                self.recent.append(FirstCollision(t, frame, i, j, *place.tolist()))
                 struck |= self.recent[-1].disks
 
     def begins(self, collision: ContactImpulse) -> bool:
@@ -130,14 +125,7 @@ class Touches:
         placed anew: nothing has struck it yet."""
         self.since = now
         self.step.clear()
-        self.recent = [one for one in self.recent if disk not in one.disks]
-
-
-def contact(position: Array, radius: Array, i: int, j: int) -> tuple[float, float]:
-    """(x, y) m where disks i and j touch; of a wall, only the disk's centre is known here."""
-    share = radius[i] / (radius[i] + radius[j]) if j >= 0 else 0.0
-    x, y = position[i] + share * (position[max(j, 0)] - position[i])
-    return float(x), float(y)
+        self.recent = [touch for touch in self.recent if disk not in touch.disks]
 
 
 def differing_since(since: Array, velocity: Array, other: Array, frame: int) -> Array:
@@ -157,11 +145,12 @@ def cause_of(
     if frame - first + 1 < WAIT:
         return None
     disks = set(np.flatnonzero(since == first).tolist())
-    noted = [one for one in (*solid.recent, *ghost.recent) if one.frame == first]
-    if not (noted := [one for one in noted if one.disks & disks]):
+    touches = [touch for touch in (*solid.recent, *ghost.recent) if touch.frame == first]
+    touches = [touch for touch in touches if touch.disks & disks]
+    if not touches:
         disk = min(disks)
         return Drift(int(first), disk, *state.position[disk].tolist()), True, True
     # both its disks, if others of them met a right one in the same frame
-    at = min(noted, key=lambda one: (not one.disks <= disks, one.t))
-    had = [any(one.pair == at.pair for one in touches.recent) for touches in (solid, ghost)]
-    return at, had[0], had[1]
+    at = min(touches, key=lambda touch: (not touch.disks <= disks, touch.t))
+    happened = [any(touch.pair == at.pair for touch in noted.recent) for noted in (solid, ghost)]
+    return at, happened[0], happened[1]

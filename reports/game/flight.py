@@ -1,5 +1,5 @@
-"""One flight of the exercise's game: the same thrusts through several engines, frame by frame; no
-server in here."""
+"""One flight of the exercise's game: what the keys do, and the same thrusts through several
+engines, frame by frame; no server in here."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import re
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
+from math import cos, inf, sin
 from typing import Any
 
 import numpy as np
@@ -14,9 +15,8 @@ import numpy as np
 from crosscheck2d.adapters.advance import advance
 from crosscheck2d.adapters.engine import Engine
 from crosscheck2d.adapters.engines import ENGINES
-from crosscheck2d.adapters.first_collisions import weight_impulse
 from crosscheck2d.adapters.host.engine import GuestEngine
-from crosscheck2d.adapters.runaway import RUNAWAY, fault_of, reach
+from crosscheck2d.adapters.run import fault_of, reach, weight_impulse
 from crosscheck2d.reports.compare.laws import nearer_way
 from crosscheck2d.reports.game.divergence import (
     NEVER,
@@ -27,9 +27,8 @@ from crosscheck2d.reports.game.divergence import (
     cause_of,
     differing_since,
 )
-from crosscheck2d.reports.game.pilot import SHIP, Pilot
 from crosscheck2d.scenarios.families.exercise import HIGH, LOW, SOURCE, asteroid_field
-from crosscheck2d.scenarios.model import Array, Scenario, Scene, State
+from crosscheck2d.scenarios.model import Array, Scenario, Scene, State, Thrust
 from crosscheck2d.scenarios.no_truth import NoTruth
 
 # s; a power of two, so that every instant of a saved flight is a whole number of steps without
@@ -42,6 +41,11 @@ EARTH, EARTH_SIZE = (3.5, 1.5), 0.5
 SLOW, SLOW_SPIN = 0.1, 0.1
 # m: distance of the places to which a ship may be set back, and the room that it must have there
 GRID, CLEARANCE = 0.125, 0.01
+SHIP = 0  # the disk that is steered
+THRUST, TURN = 0.25, 1.0  # m/s2 and rad/s2, of the exercise: force mass 0.25, torque MoI 1.0
+FORWARD = {"w": 1.0, "s": -1.0}
+LEFT = {"a": 1.0, "d": -1.0}
+KEYS = (*FORWARD, *LEFT)
 
 
 def field_scenario(
@@ -62,6 +66,49 @@ def field_scenario(
 
 
 @dataclass
+class Pilot:
+    """Keys in, one force and one torque at a time out, kept as thrusts. `interval`: s, of a frame;
+    keys act at the start of one.
+
+    W and S accelerate along the ship's heading as it is when the key event comes (a repeated event
+    aims anew), A and D turn; releasing either key of a pair ends its thrust, as in the exercise.
+
+    Attributes:
+        held: the force and the torque that are on, without an end.
+        past: those that have ended.
+    """
+
+    scene: Scene
+    interval: float
+    held: dict[str, Thrust] = field(default_factory=dict)
+    past: list[Thrust] = field(default_factory=list)
+
+    def key(self, key: str, down: bool, frame: int, angle: float) -> None:
+        kind, now, force, torque = "torque", frame * self.interval, np.zeros(2), 0.0
+        if key in FORWARD:
+            kind, size = "force", down * FORWARD[key] * THRUST * float(self.scene.mass[SHIP])
+            force = size * np.array([cos(angle), sin(angle)])
+        else:
+            torque = down * LEFT[key] * TURN * float(self.scene.inertia[SHIP])
+        before = self.held.get(kind)
+        if before and np.array_equal(before.force, force) and before.torque == torque:
+            return  # a repeated key that aims as before
+        if before and before.start < now:
+            self.past.append(replace(before, stop=now))
+        self.held.pop(kind, None)
+        if force.any() or torque:
+            self.held[kind] = Thrust(SHIP, now, inf, force, torque)
+
+    def thrusts(self, frames: int) -> list[Thrust]:
+        """All thrusts of the first `frames` frames, in order of time; they end there at the
+        latest."""
+        end = frames * self.interval
+        begun = [thrust for thrust in (*self.past, *self.held.values()) if thrust.start < end]
+        cut = [replace(thrust, stop=min(thrust.stop, end)) for thrust in begun]
+        return sorted(cut, key=lambda thrust: thrust.start)
+
+
+@dataclass
 class Flyer:
     """The ship and the field as one engine has them.
 
@@ -69,12 +116,12 @@ class Flyer:
         name: `engine:profile`.
         state: at the end of the last frame.
         touches: the latest collisions, and how many there were.
+        differs: (n,) frame since which each disk has had another velocity than in the solid one.
         left: why it flies no more, or "".
         left_at: s on the flight's clock, the end of the frame in which it left.
-        edges: where and when its ship left the field, each time.
+        edges: where and when its ship left the field and was set back, each time.
         beside: whether the start was taken when its ship was set back last.
         seen: how many of its collisions since then are in `touches`.
-        differs: (n,) frame since which each disk has had another velocity than in the solid one.
         divergence: where it diverged from the solid one.
     """
 
@@ -90,13 +137,7 @@ class Flyer:
     seen: int = 0
     divergence: Divergence | None = None
 
-    @property
-    def set_backs(self) -> int:
-        """How often its ship was set back."""
-        return len(self.edges)
-
     def leave(self, reason: Exception | str, at: float) -> None:
-        """Fly no more, from `at` s of the flight on."""
         if isinstance(reason, Exception):
             reason = on_the_clock(reason, self.touches.since)
         self.left, self.left_at = reason, at
@@ -122,10 +163,10 @@ SECONDS = re.compile(r"(?<![\w.])(\d+(?:\.\d+)?(?:e[+-]?\d+)?) s\b")
 def on_the_clock(error: Exception, since: float) -> str:
     """What an engine says when it fails. An event engine says when: its clock runs from `since` s
     of the flight on, and its times are given as the flight's."""
-    said = str(error) or type(error).__name__
+    text = str(error) or type(error).__name__
     if not isinstance(error.__cause__, NoTruth):
-        return said
-    return SECONDS.sub(lambda time: f"{since + float(time[1]):.4g} s", said)
+        return text
+    return SECONDS.sub(lambda time: f"{since + float(time[1]):.4g} s", text)
 
 
 class Flight:
@@ -143,28 +184,25 @@ class Flight:
         self.scenario, self.replayed = scenario, replayed
         self.substeps = scenario.middle_substeps
         self.dt = scenario.dt(self.substeps)
-        wrap = scenario.scene.wrap
-        self.is_game = wrap is not None and np.array_equal(wrap, [LOW, HIGH])
-        self.farthest = RUNAWAY * reach(scenario)
-        self.pilot = Pilot(scenario.scene, scenario.sample_interval)
+        scene = scenario.scene
+        self.is_game = scene.wrap is not None and np.array_equal(scene.wrap, [LOW, HIGH])
+        self.farthest = reach(scenario)
+        self.pilot = Pilot(scene, scenario.sample_interval)
         self.steered = scenario  # with the thrusts of the keys that are down
-        self.frame, self.left_at, self.won_at = 0, -1, -1
+        self.frame, self.left_at = 0, -1
         self.threads = ThreadPoolExecutor(len(names))
-        self.flyers = [self.boarded(name) for name in names]
-
-    def boarded(self, name: str) -> Flyer:
-        """An engine with the scene in it; one that cannot be made or refuses says why in `left`."""
-        scene = self.scenario.scene
-        touches = Touches(scene, self.dt, weight_impulse(scene, self.dt))
-        agreed = np.full(scene.n, NEVER)
-        flyer = Flyer(name, None, scene.state, touches, agreed)  # type: ignore[arg-type]
-        try:
-            flyer.engine = ENGINES[name].make()
-            flyer.engine.load(scene, self.dt)
-            flyer.state = flyer.engine.read()
-        except Exception as error:  # a missing library, a refusal, or whatever an engine raises
-            flyer.leave(error, 0.0)
-        return flyer
+        self.flyers: list[Flyer] = []
+        for name in names:
+            touches = Touches(scene, self.dt, weight_impulse(scene, self.dt))
+            agreed = np.full(scene.n, NEVER)
+            flyer = Flyer(name, None, scene.state, touches, agreed)  # type: ignore[arg-type]
+            self.flyers.append(flyer)
+            try:
+                flyer.engine = ENGINES[name].make()
+                flyer.engine.load(scene, self.dt)
+                flyer.state = flyer.engine.read()
+            except Exception as error:  # a missing library, a refusal, or whatever an engine raises
+                flyer.leave(error, 0.0)
 
     @property
     def solid(self) -> Flyer:
@@ -180,46 +218,52 @@ class Flight:
 
     @property
     def over(self) -> bool:
-        """Whether there is nothing left to fly."""
         return self.frame >= self.scenario.intervals or all(flyer.left for flyer in self.flyers)
 
+    @property
+    def won(self) -> bool:
+        """The exercise's rule as written: a squared distance below a size, no absolute value of the
+        spin."""
+        ship = self.solid.state
+        way, speed = ship.position[SHIP] - np.array(EARTH), ship.velocity[SHIP]
+        near = float(way @ way) < EARTH_SIZE and float(speed @ speed) < SLOW
+        return self.is_game and near and float(ship.angular_velocity[SHIP]) < SLOW_SPIN
+
     def key(self, key: str, down: bool) -> None:
-        """A key event, which acts from the next frame on; a replay has its own."""
         if not self.replayed:
             self.pilot.key(key, down, self.frame, float(self.solid.state.angle[SHIP]))
-            self.steered = replace(self.scenario, thrusts=self.pilot.now)
+            self.steered = replace(self.scenario, thrusts=list(self.pilot.held.values()))
 
     def advance(self, count: int = 1) -> None:
-        """Fly so many frames, or what is left of them."""
+        """Fly so many frames, or what is left of them. Engines in processes of their own fly side
+        by side, and beside the others."""
         for _ in range(count):
             if self.over:
                 return
-            self.fly_all([flyer for flyer in self.flyers if not flyer.left])
+            flyers = [flyer for flyer in self.flyers if not flyer.left]
+            guests = [flyer for flyer in flyers if isinstance(flyer.engine, GuestEngine)]
+            waiting = [self.threads.submit(self.fly, flyer) for flyer in guests]
+            for flyer in flyers:
+                if not isinstance(flyer.engine, GuestEngine):
+                    self.fly(flyer)
+            for future in waiting:
+                future.result()
+            solid = self.solid
+            if self.left_at < 0 and solid.edges and solid.edges[-1].frame == self.frame:
+                self.left_at = self.frame
             self.frame += 1
-            self.compare()
+            for ghost in self.flyers:
+                if not (ghost is solid or ghost.left or ghost.divergence):
+                    ghost.divergence = self.divergence_of(ghost)
 
-    def fly_all(self, flyers: Sequence[Flyer]) -> None:
-        """One frame of every engine; those in processes of their own fly side by side, and beside
-        the others."""
-        elsewhere = [flyer for flyer in flyers if isinstance(flyer.engine, GuestEngine)]
-        waiting = [self.threads.submit(self.fly, flyer, self.steered) for flyer in elsewhere]
-        for flyer in flyers:
-            if not isinstance(flyer.engine, GuestEngine):
-                self.fly(flyer, self.steered)
-        for each in waiting:
-            each.result()
-        solid = self.solid
-        if self.left_at < 0 and solid.edges and solid.edges[-1].frame == self.frame:
-            self.left_at = self.frame
-
-    def fly(self, flyer: Flyer, steered: Scenario) -> None:
+    def fly(self, flyer: Flyer) -> None:
         """One frame of one engine, by the same steps as `play` makes them, looked at once or, near
         an edge, at each."""
         stride = 1 if self.may_leave(flyer.state) else self.substeps
         first = self.frame * self.substeps
         for step in range(first, first + self.substeps, stride):
             if not flyer.left:
-                self.fly_on(flyer, steered, step, stride)
+                self.fly_on(flyer, step, stride)
 
     def may_leave(self, state: State) -> bool:
         """Whether the ship is so near an edge that a frame may carry it beyond: by its own
@@ -228,21 +272,17 @@ class Flight:
         One that is displaced further, as out of a deep overlap, is set back at the end of the frame
         instead of the step.
         """
-        if not self.is_game:
-            return False
-        low, high = np.array([LOW, HIGH])
         fastest = np.abs(state.velocity).max(axis=0)
         room = 2 * (np.abs(state.velocity[SHIP]) + fastest) * self.scenario.sample_interval
-        return bool(
-            ((state.position[SHIP] < low + room) | (state.position[SHIP] > high - room)).any()
-        )
+        ship, low, high = state.position[SHIP], np.add(LOW, room), np.subtract(HIGH, room)
+        return self.is_game and bool(((ship < low) | (ship > high)).any())
 
-    def fly_on(self, flyer: Flyer, steered: Scenario, step: int, count: int) -> None:
+    def fly_on(self, flyer: Flyer, step: int, count: int) -> None:
         """`count` steps of one engine from step number `step` on; what it raises or does wrong
         makes it leave."""
         before, ends = flyer.state, (self.frame + 1) * self.scenario.sample_interval
         try:
-            advance(flyer.engine, steered, step, count, self.dt)
+            advance(flyer.engine, self.steered, step, count, self.dt)
             flyer.state = flyer.engine.read()
             collisions = flyer.engine.collisions()
         except Exception as error:  # a refusal, or whatever an engine raises
@@ -255,16 +295,11 @@ class Flight:
         if len(collisions) > flyer.seen:
             flyer.touches.note(collisions[flyer.seen :], self.frame, before, step * self.dt)
             flyer.seen = len(collisions)
-        if self.ship_left(before, flyer.state):
+        jump = np.abs(flyer.state.position[SHIP] - before.position[SHIP])
+        if self.is_game and (jump > np.subtract(HIGH, LOW) / 2).any():  # onto the opposite edge
             self.set_back(flyer, before, (step + count) * self.dt)
 
-    def ship_left(self, before: State, after: State) -> bool:
-        """Whether the ship was set onto the opposite edge of the game's field."""
-        jump = np.abs(after.position[SHIP] - before.position[SHIP])
-        return self.is_game and bool((jump > (np.array(HIGH) - LOW) / 2).any())
-
     def set_back(self, flyer: Flyer, before: State, now: float) -> None:
-        """The ship to its start, all else as it is, at `now` s; it was last seen in `before`."""
         scene = self.scenario.scene
         arrays: dict[str, Any] = {
             name: np.array(array) for name, array in vars(flyer.state).items()
@@ -282,46 +317,26 @@ class Flight:
         except Exception as error:  # a refusal, or whatever an engine raises
             flyer.leave(f"the ship cannot be set back: {on_the_clock(error, now)}", now)
 
-    def compare(self) -> None:
-        """Note who diverges from the solid one at the end of this frame, and whether the game is
-        won."""
-        solid = self.solid
-        for ghost in self.flyers:
-            if not (ghost is solid or ghost.left or ghost.divergence):
-                ghost.divergence = self.divergence_of(ghost)
-        if self.won and self.won_at < 0:
-            self.won_at = self.frame
-
     def divergence_of(self, ghost: Flyer) -> Divergence | None:
-        """Where a ghost has diverged from the solid one by now.
+        """Where a ghost has diverged from the solid one by the end of the last frame.
 
         Ships are set back one by one, so that a ship is not compared while it was set back in one
         of the two only; one that stays the only one has diverged at the edge.
         """
-        solid, frame = self.solid, self.frame - 1  # the one that was flown
+        solid, frame = self.solid, self.frame - 1
         velocity, other = solid.state.velocity.copy(), ghost.state.velocity
-        if solid.set_backs != ghost.set_backs:
+        back = len(solid.edges), len(ghost.edges)
+        if back[0] != back[1]:
             velocity[SHIP] = other[SHIP]
         ghost.differs = differing_since(ghost.differs, velocity, other, frame)
-        if found := cause_of(ghost.differs, solid.touches, ghost.touches, ghost.state, frame):
-            at, in_solid, in_ghost = found
+        if cause := cause_of(ghost.differs, solid.touches, ghost.touches, ghost.state, frame):
+            at, in_solid, in_ghost = cause
             only = "" if in_solid and in_ghost else solid.name if in_solid else ghost.name
             return Divergence(at, solid.name, only)
-        if solid.set_backs != ghost.set_backs:
-            more = max(solid, ghost, key=lambda flyer: flyer.set_backs)
-            edge = more.edges[min(solid.set_backs, ghost.set_backs)]
-            if frame - edge.frame + 1 >= WAIT:
-                return Divergence(edge, solid.name, more.name)
+        more = solid if back[0] > back[1] else ghost
+        if back[0] != back[1] and frame - more.edges[min(back)].frame + 1 >= WAIT:
+            return Divergence(more.edges[min(back)], solid.name, more.name)
         return None
-
-    @property
-    def won(self) -> bool:
-        """The exercise's rule as written: a squared distance below a size, no absolute value of the
-        spin."""
-        ship = self.solid.state
-        way, speed = ship.position[SHIP] - np.array(EARTH), ship.velocity[SHIP]
-        near = float(way @ way) < EARTH_SIZE and float(speed @ speed) < SLOW
-        return self.is_game and near and float(ship.angular_velocity[SHIP]) < SLOW_SPIN
 
     def measures(self, flyer: Flyer) -> dict[str, Any]:
         """Momentum kg m/s, energy with spin J, how far ship and farthest disk are from the solid
@@ -356,7 +371,6 @@ class Flight:
         return replace(self.scenario, duration=duration, thrusts=self.pilot.thrusts(frames))
 
     def close(self) -> None:
-        """Give every engine back."""
         self.threads.shutdown(wait=False)
         for flyer in self.flyers:
             if flyer.engine is not None:

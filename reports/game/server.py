@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from asyncio import CancelledError
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -9,6 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from secrets import token_hex
 from time import monotonic
+from typing import Any
 from urllib.parse import urlsplit
 
 from starlette.requests import Request
@@ -19,85 +21,16 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from crosscheck2d.adapters.engines import ENGINES, OWN
 from crosscheck2d.reports.game.divergence import DIVERGED, WAIT
 from crosscheck2d.reports.game.flight import FRAME, SUBSTEPS
-from crosscheck2d.reports.game.session import Session, as_json
+from crosscheck2d.reports.game.session import Session
 from crosscheck2d.reports.page.documents import render
 from crosscheck2d.reports.page.own_solvers import Said
 from crosscheck2d.reports.page.server import MOST_TABS, NAMES, in_thread
 from crosscheck2d.reports.page.style import looks_of
 from crosscheck2d.scenarios.model import Scenario
 
-
-def game_page(
-    engines: Sequence[str],
-    file: Scenario | None,
-    mark: str,
-    restitution: float,
-    said: Mapping[str, Sequence[Said]],
-) -> str:
-    """The page, which begins with these engines, in a field of this restitution.
-
-    `file`: the flight it shows again; `mark`: its server's; `said`: engine -> what `check` says of
-    its file.
-    """
-    # in space there is no friction, and who adds it gives the bits of another engine
-    offered = [name for name, row in ENGINES.items() if not row.adds_friction]
-    rows = {name: ENGINES[name] for name in dict.fromkeys([*engines, *offered])}
-    return render(
-        "game/game.html.j2",
-        generator="crosscheck play",
-        scripts=["game/field.js", "game/game.js"],
-        styles=["page/live.css", "game/game.css"],
-        looks=looks_of(rows),
-        connects=True,
-        rows=rows,
-        labels=labels(list(rows)),
-        flown=list(engines),
-        steps={k: FRAME / k for k in SUBSTEPS},
-        file=file,
-        mark=mark,
-        diverged=DIVERGED,
-        wait=WAIT,
-        restitution=restitution,
-        said=said,
-    )
-
-
-def labels(names: Sequence[str]) -> dict[str, str]:
-    """How the field calls each engine: a solver's file by as much of the end of its path as tells
-    it from the others, all else by its name."""
-    paths = {name: Path(name.removesuffix(OWN)).parts for name in names if name.endswith(OWN)}
-    found = {name: name for name in names}
-    for name, parts in paths.items():
-        others = [other for one, other in paths.items() if one != name]
-        ends = (parts[-k:] for k in range(1, len(parts) + 1))
-        found[name] = "/".join(
-            next((end for end in ends if all(o[-len(end) :] != end for o in others)), parts)
-        )
-    return found
-
-
 # messages: a page sends 60 a second and the keys; and faulty ones in all
 MOST_A_SECOND, MOST_FAULTS = 240, 50
 POLICY, LATER = 1008, 1013  # WebSocket close codes: it breaks the rules; try again later
-
-
-@dataclass
-class Allowance:
-    """So many messages a second, and as many at once."""
-
-    rate: float
-    left: float = 0.0
-    since: float = field(default_factory=monotonic)
-
-    def __post_init__(self) -> None:
-        self.left = self.rate
-
-    def spend(self) -> bool:
-        """Whether one more is allowed now."""
-        now = monotonic()
-        self.left = min(self.rate, self.left + (now - self.since) * self.rate) - 1
-        self.since = now
-        return self.left >= 0
 
 
 @dataclass
@@ -120,14 +53,34 @@ class Game:
     mark: str = field(default_factory=lambda: token_hex(8))
 
     async def page(self, _: Request) -> HTMLResponse:
-        """The page."""
-        return HTMLResponse(
-            game_page(self.engines, self.file, self.mark, self.restitution, self.said)
+        # in space there is no friction, and who adds it gives the bits of another engine
+        offered = [name for name, row in ENGINES.items() if not row.adds_friction]
+        rows = {name: ENGINES[name] for name in dict.fromkeys([*self.engines, *offered])}
+        page = render(
+            "game/game.html.j2",
+            generator="crosscheck play",
+            scripts=["game/field.js", "game/game.js"],
+            styles=["page/live.css", "game/game.css"],
+            looks=looks_of(rows),
+            connects=True,
+            rows=rows,
+            labels=labels(list(rows)),
+            flown=list(self.engines),
+            steps={k: FRAME / k for k in SUBSTEPS},
+            file=self.file,
+            mark=self.mark,
+            diverged=DIVERGED,
+            wait=WAIT,
+            restitution=self.restitution,
+            said=self.said,
         )
+        return HTMLResponse(page)
 
     async def fly(self, socket: WebSocket) -> None:
-        """A tab, as long as it keeps the rules."""
-        if not same_origin(socket):
+        """A tab, as long as it keeps the rules. Only a page of this server may open it."""
+        host = socket.headers.get("host", "")
+        own = urlsplit(f"//{host}").hostname in NAMES
+        if not own or socket.headers.get("origin") != f"http://{host}":
             await socket.close(POLICY)  # before it is accepted: the browser gets 403
             return
         await socket.accept()
@@ -139,7 +92,7 @@ class Game:
         try:
             session = await in_thread(Session, self.engines, self.file, self.restitution)
             with suppress(WebSocketDisconnect):
-                await socket.send_text(as_json(session.field() | {"server": self.mark}))
+                await send(socket, session.field() | {"server": self.mark})
                 await converse(socket, session)
         finally:
             if session is not None and not session.given_up:
@@ -147,12 +100,21 @@ class Game:
             self.tabs -= 1
 
 
-def same_origin(socket: WebSocket) -> bool:
-    """Whether the page that opens the socket comes from this server; no other page may use it."""
-    host = socket.headers.get("host", "")
-    return (
-        urlsplit(f"//{host}").hostname in NAMES and socket.headers.get("origin") == f"http://{host}"
-    )
+def labels(names: Sequence[str]) -> dict[str, str]:
+    """How the field calls each engine: a solver's file by as much of the end of its path as tells
+    it from the others, all else by its name."""
+    paths = {name: Path(name.removesuffix(OWN)).parts for name in names if name.endswith(OWN)}
+    ends = {name: name for name in names}
+    for name, parts in paths.items():
+        others = [path for key, path in paths.items() if key != name]
+        tails = (parts[-k:] for k in range(1, len(parts) + 1))
+        unique = (tail for tail in tails if all(path[-len(tail) :] != tail for path in others))
+        ends[name] = "/".join(next(unique, parts))
+    return ends
+
+
+async def send(socket: WebSocket, answer: dict[str, Any]) -> None:
+    await socket.send_text(json.dumps(answer, separators=(",", ":")))
 
 
 async def converse(socket: WebSocket, session: Session) -> None:
@@ -162,12 +124,16 @@ async def converse(socket: WebSocket, session: Session) -> None:
     The engines of a tab work in a thread, one message at a time: a solver that hangs, or is
     compiled for the first time, keeps its own tab waiting and no other.
     """
-    allowance, faults = Allowance(MOST_A_SECOND), 0
+    # so many messages a second, and as many at once
+    allowed, before, faults = float(MOST_A_SECOND), monotonic(), 0
     while True:
         event = await socket.receive()
         if event["type"] == "websocket.disconnect":
             return
-        if not allowance.spend():
+        now = monotonic()
+        allowed = min(MOST_A_SECOND, allowed + (now - before) * MOST_A_SECOND) - 1
+        before = now
+        if allowed < 0:
             await socket.close(POLICY, f"more than {MOST_A_SECOND} messages a second")
             return
         try:
@@ -182,9 +148,8 @@ async def converse(socket: WebSocket, session: Session) -> None:
             await socket.close(POLICY, f"more than {MOST_FAULTS} faulty messages")
             return
         if answer is not None:
-            await socket.send_text(as_json(answer))
+            await send(socket, answer)
 
 
 def routes(game: Game) -> list[BaseRoute]:
-    """The game at /."""
     return [Route("/", game.page), WebSocketRoute("/fly", game.fly)]

@@ -1,20 +1,92 @@
-"""One open page of the game: answers its messages, one by one; no server in here."""
+"""One open page of the game: what it may ask, checked, and the answers; no server in here."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from time import perf_counter
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from crosscheck2d.adapters.advance import turned
-from crosscheck2d.reports.game.flight import EARTH, EARTH_SIZE, Flight, Flyer, field_scenario
-from crosscheck2d.reports.game.messages import Fly, Frames, Key, Message, read_message
-from crosscheck2d.reports.game.pilot import SHIP
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.reports.game.flight import (
+    EARTH,
+    EARTH_SIZE,
+    KEYS,
+    SHIP,
+    SUBSTEPS,
+    Flight,
+    Flyer,
+    field_scenario,
+)
+from crosscheck2d.reports.page.server import MOST_BYTES
 from crosscheck2d.scenarios.files.scene_file import scene_text
-from crosscheck2d.scenarios.model import Array, Scenario
+from crosscheck2d.scenarios.model import Scenario
+
+MOST_FRAMES = 4  # that one message may ask for
+MOST_ENGINES = 16  # in a flight
+
+
+def known(name: str) -> str:
+    if name not in ENGINES:
+        raise ValueError(f"{name!r} is no engine")
+    return name
+
+
+class _Message(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+
+class Fly(_Message):
+    """Begin a flight: through a new field, or, where there is a file, that flight again."""
+
+    do: Literal["fly"]
+    engines: list[Annotated[str, AfterValidator(known)]] = Field(
+        min_length=1, max_length=MOST_ENGINES
+    )
+    seed: Annotated[int, Field(ge=0, lt=2**32)] = 0
+    asteroids: Annotated[int, Field(ge=0, le=40)] = 20
+    restitution: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = 0.9
+    substeps: Literal[SUBSTEPS] = 16  # type: ignore[valid-type]
+
+
+class Frames(_Message):
+    do: Literal["frames"]
+    count: int = Field(ge=1, le=MOST_FRAMES)
+
+
+class Key(_Message):
+    do: Literal["key"]
+    key: Literal[KEYS]  # type: ignore[valid-type]
+    down: bool
+
+
+class Save(_Message):
+    do: Literal["save"]
+
+
+Message = Fly | Frames | Key | Save
+_ANY: TypeAdapter[Message] = TypeAdapter(Annotated[Message, Field(discriminator="do")])
+
+
+def read_message(text: str | bytes) -> Message:
+    """The message in `text`, JSON.
+
+    Raises:
+        ValueError: one sentence that names every fault.
+    """
+    if len(text) > MOST_BYTES:
+        raise ValueError(f"the message has {len(text)} bytes; must have at most {MOST_BYTES}")
+    try:
+        return _ANY.validate_json(text)
+    except ValidationError as error:
+        faults = (
+            f"{'.'.join(map(str, fault['loc'])) or 'message'}: {fault['msg']}"
+            for fault in error.errors()
+        )
+        raise ValueError("; ".join(faults)[:500]) from error
 
 
 class Session:
@@ -29,10 +101,9 @@ class Session:
         self, engines: Sequence[str], file: Scenario | None = None, restitution: float = 0.9
     ) -> None:
         self.file, self.given_up = file, False
-        self.flight = self.begun(Fly(do="fly", engines=list(engines), restitution=restitution))
+        self.flight = self.begin(Fly(do="fly", engines=list(engines), restitution=restitution))
 
-    def begun(self, wish: Fly) -> Flight:
-        """A new flight as wished; a file's own field and step are kept."""
+    def begin(self, wish: Fly) -> Flight:
         if self.file is not None:
             return Flight(self.file, wish.engines, replayed=True)
         scenario = field_scenario(wish.seed, wish.asteroids, wish.restitution, wish.substeps)
@@ -44,7 +115,7 @@ class Session:
         message: Message = read_message(text)
         if isinstance(message, Fly):
             self.flight.close()
-            self.flight = self.begun(message)
+            self.flight = self.begin(message)
             return self.field()
         if isinstance(message, Frames):
             started = perf_counter()
@@ -63,33 +134,29 @@ class Session:
         }
 
     def field(self) -> dict[str, Any]:
-        """What stays as it is during a flight, and its first frame."""
         flight = self.flight
         scene = flight.scenario.scene
         return {
             "kind": "field",
-            "name": flight.scenario.name,
             "radius": scene.radius.tolist(),
             "wrap": scene.wrap.ravel().tolist() if scene.wrap is not None else None,
             "walls": scene.walls.reshape(-1, 4).tolist(),
             "earth": [*EARTH, EARTH_SIZE] if flight.is_game else None,
             "interval": flight.scenario.sample_interval,
-            "dt": flight.dt,
             "replayed": flight.replayed,
             "engines": [flyer.name for flyer in flight.flyers],
-            "duration": flight.scenario.duration,
             "first": self.now(),
         }
 
     def now(self) -> dict[str, Any]:
-        """Where everything is at the end of the last frame."""
-        flight = self.flight
-        ship = flight.solid.state
+        flight, interval = self.flight, self.flight.scenario.sample_interval
+        solid, ship = flight.solid, flight.solid.state
+        last = solid.edges[-1] if solid.edges else None
         return {
             "kind": "frame",
             "frame": flight.frame,
-            "t": flight.frame * flight.scenario.sample_interval,
-            "solid": flight.flyers.index(flight.solid),
+            "t": flight.frame * interval,
+            "solid": flight.flyers.index(solid),
             "solid_since": flight.solid_since,
             "flyers": [self.to_json(flyer) for flyer in flight.flyers],
             "ship": [
@@ -101,33 +168,20 @@ class Session:
             "force": self.force(),
             "won": flight.won,
             "over": flight.over,
-            "set_back": self.set_back(),
+            # when the solid ship was set back last, s, and whether beside its start
+            "set_back": last and {"t": (last.frame + 1) * interval, "beside": solid.beside},
         }
-
-    def set_back(self) -> dict[str, Any] | None:
-        """When the solid ship was set back last, s, and whether beside its start; None: never."""
-        solid = self.flight.solid
-        if not solid.edges:
-            return None
-        ends = (solid.edges[-1].frame + 1) * self.flight.scenario.sample_interval
-        return {"t": ends, "beside": solid.beside}
 
     def force(self) -> list[float]:
         """What drives the ship: force N in the world frame, torque N m."""
         flight = self.flight
         time = flight.frame * flight.scenario.sample_interval
-        thrusts = flight.scenario.thrusts if flight.replayed else flight.pilot.now
-        on = [
-            thrust
-            for thrust in thrusts
-            if thrust.disk == SHIP and thrust.start <= time < thrust.stop
-        ]
+        steered = flight.pilot.held.values()
+        thrusts = flight.scenario.thrusts if flight.replayed else steered
+        thrusts = [t for t in thrusts if t.disk == SHIP and t.start <= time < t.stop]
         angle = float(flight.solid.state.angle[SHIP])
-        forces = [
-            turned(thrust.force, angle) if thrust.frame == "body" else thrust.force for thrust in on
-        ]
-        force = sum(forces, np.zeros(2))
-        return [*force.tolist(), float(sum(thrust.torque for thrust in on))]
+        forces = [turned(t.force, angle) if t.frame == "body" else t.force for t in thrusts]
+        return [*sum(forces, np.zeros(2)).tolist(), float(sum(t.torque for t in thrusts))]
 
     def to_json(self, flyer: Flyer) -> dict[str, Any]:
         """One engine's disks, its measures, and where it diverged or why it left."""
@@ -137,24 +191,13 @@ class Session:
             ends = (at.frame + 1) * self.flight.scenario.sample_interval
             diverged = at._asdict() | {"t": ends, "solid": solid, "only": only}
         return self.flight.measures(flyer) | {
-            "x": rounded(flyer.state.position.ravel()),
-            "angle": rounded(flyer.state.angle),
+            # to 0.1 mm or 0.1 mrad, finer than a pixel
+            "x": [round(x, 4) for x in flyer.state.position.ravel().tolist()],
+            "angle": [round(angle, 4) for angle in flyer.state.angle.tolist()],
             "left": flyer.left,
             "left_at": flyer.left_at,
             "diverged": diverged,
-            "set_backs": flyer.set_backs,
         }
 
     def close(self) -> None:
-        """Give the engines back."""
         self.flight.close()
-
-
-def rounded(values: Array) -> list[float]:
-    """To 0.1 mm or 0.1 mrad, finer than a pixel."""
-    return [round(value, 4) for value in values.tolist()]
-
-
-def as_json(answer: dict[str, Any]) -> str:
-    """Compact; what is not finite was found out before."""
-    return json.dumps(answer, separators=(",", ":"))

@@ -139,11 +139,13 @@ def horizon_claims(
         ),
     )
     if restitution == 1.0:
+        # a disk that meets two others in one step of Box2D may gain 2 % of the energy there
         yield Claim(
-            "The energy stays comparable: with e = 1 the engines with steps keep it for 20 s,"
-            " long past the horizon, within a millionth (Box2D computes in single precision).",
+            "The energy stays comparable: with e = 1 the engines with steps keep it for 20 s, long"
+            " past the horizon, within a millionth, and Box2D (single precision) within 3 %.",
             lambda shown: all(
-                shown.x(name, 1)[-1] == 20 > 1.3 * end and np.abs(shown.y(name, 1) - 1).max() < 1e-6
+                shown.x(name, 1)[-1] == 20 > 1.3 * end
+                and np.abs(shown.y(name, 1) - 1).max() < (0.03 if name == "box2d:matched" else 1e-6)
                 for name in STEPPED
             ),
         )

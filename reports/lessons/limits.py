@@ -26,6 +26,7 @@ from crosscheck2d.reports.page.style import TRUTH, number
 from crosscheck2d.reports.stability.cases import CASES
 from crosscheck2d.reports.stability.explain import explained, with_replays
 from crosscheck2d.reports.stability.limits import (
+    DRIVEN_ENGINES,
     NEVER_FAILS,
     QUICK,
     Case,
@@ -35,7 +36,6 @@ from crosscheck2d.reports.stability.limits import (
     engines_of,
 )
 from crosscheck2d.reports.stability.overview import bracket, why
-from crosscheck2d.reports.stability.variants import DRIVEN_ENGINES
 
 HARSHNESS = tuple(range(9))  # places from the gentlest value of a case to its harshest
 SECONDS = 4.0  # that a replay lasts

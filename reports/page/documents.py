@@ -20,7 +20,7 @@ from crosscheck2d.reports.page import style
 from crosscheck2d.reports.terminal.foreign_text import encoded
 
 REPORTS = Path(__file__).parents[1]
-ENGINE = ("page/player.js", "page/player_canvas.js")  # the replay
+ENGINE = ("page/player.js",)  # the replay
 
 
 def render(
@@ -38,18 +38,23 @@ def render(
 
     Args:
         generator: the command that makes it; it marks the file as one that may be overwritten.
-        looks: name -> how it is drawn; `who` and `swatch` of macros.html.j2 show these names.
+        looks: name -> how it is drawn.
         connects: whether its scripts may connect to the server of the page.
         fields: the other names of the template; a missing one raises `jinja2.UndefinedError`.
     """
     sources = [(REPORTS / script).read_text(encoding="utf-8") for script in scripts]
-    text = css() + "".join((REPORTS / each).read_text(encoding="utf-8") for each in styles)
-    policy = content_policy(sources) + ("; connect-src 'self'" if connects else "")
+    sheets = [(REPORTS / name).read_text(encoding="utf-8") for name in ("page/kit.css", *styles)]
+    light, dark = style.css_variables(dark=False), style.css_variables(dark=True)
+    colours = f":root{{{light}}}@media screen and (prefers-color-scheme:dark){{:root{{{dark}}}}}\n"
+    digests = (hashlib.sha256(source.encode()).digest() for source in sources)
+    hashes = " ".join(f"'sha256-{base64.b64encode(digest).decode()}'" for digest in digests)
+    policy = f"default-src 'none'; script-src {hashes}; style-src 'unsafe-inline'"
+    policy += "; img-src data: blob:" + "; connect-src 'self'" * connects
     return fragment(
         template,
         generator=generator,
         policy=policy,
-        css=Markup(text),
+        css=Markup("".join([colours, *sheets])),
         looks=looks,
         looks_json=for_script(
             {name: look._asdict() | {"path": look.path} for name, look in looks.items()}
@@ -66,45 +71,21 @@ def fragment(template: str, **fields: Any) -> str:
 
 @cache
 def environment() -> Environment:
-    """The environment of all templates: text is escaped, and an undefined name is an error."""
-    made = Environment(
+    templates = Environment(
         loader=FileSystemLoader(REPORTS),
         autoescape=True,
         trim_blocks=True,
         lstrip_blocks=True,
         undefined=StrictUndefined,
     )
-    made.filters["number"] = style.number
-    made.filters["for_script"] = for_script
-    return made
-
-
-def css() -> str:
-    """The style sheet of all pages with the colours of style.py in front, for light and for
-    dark."""
-    light, dark = style.css_variables(dark=False), style.css_variables(dark=True)
-    return f":root{{{light}}}@media screen and (prefers-color-scheme:dark){{:root{{{dark}}}}}\n" + (
-        REPORTS / "page" / "kit.css"
-    ).read_text(encoding="utf-8")
+    templates.filters.update(number=style.number, for_script=for_script)
+    return templates
 
 
 def for_script(value: Any) -> Markup:
-    """`value` as JSON that may stand in a script block."""
     return Markup(json.dumps(value).replace("<", "\\u003c"))
 
 
-def content_policy(scripts: Sequence[str]) -> str:
-    """A Content-Security-Policy by which the browser runs these scripts only and fetches
-    nothing."""
-    hashes = (
-        base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in scripts
-    )
-    allowed = " ".join(f"'sha256-{digest}'" for digest in hashes)
-    return (
-        f"default-src 'none'; script-src {allowed}; style-src 'unsafe-inline'; img-src data: blob:"
-    )
-
-
 def deflated(text: str) -> str:
-    """Text, deflated, as base64: what `unpack` of player.js reads."""
+    """Text, deflated, as base64: what `inflate` of player.js reads."""
     return base64.b64encode(zlib.compress(encoded(text))).decode()

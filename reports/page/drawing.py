@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -64,19 +65,17 @@ class Line(NamedTuple):
 
     @property
     def look(self) -> style.Look:
-        """How it is drawn."""
         return style.look(*self.name.partition(":")[::2])
 
 
-def new_figure(width: float = 5.8, height: float = 3.6, **grid: Any) -> tuple[Figure, Any]:
-    """An empty figure of this size in inches (100 pixels of a page), and its axes; `grid` goes to
-    `Figure.subplots`."""
+def new_figure(width: float = 5.8, height: float = 3.6) -> tuple[Figure, Any]:
+    """An empty figure of this size in inches (100 pixels of a page), and its axes."""
     from matplotlib import rc_context  # 0.3 s: only pages with charts pay
     from matplotlib.figure import Figure
 
     with rc_context(SETTINGS):
         figure = Figure((width, height), layout="constrained")
-        return figure, figure.subplots(**grid)
+        return figure, figure.subplots()
 
 
 def draw_lines(
@@ -90,12 +89,19 @@ def draw_lines(
 ) -> None:
     """Draw `lines` with their labels; `logarithmic`: "x", "y", "xy" or ""; the ticks of a
     logarithmic axis in µs (`x_unit`, `y_unit`) are written as µs, ms and s."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+
     for line in lines:
         draw_line(axes, line)
-    for axis, is_log in ((axes.xaxis, "x" in logarithmic), (axes.yaxis, "y" in logarithmic)):
-        if is_log:
-            (axes.set_xscale if axis is axes.xaxis else axes.set_yscale)("log")
-            label_decades(axis, x_unit if axis is axes.xaxis else y_unit)
+    for letter, axis, unit in (("x", axes.xaxis, x_unit), ("y", axes.yaxis, y_unit)):
+        if letter in logarithmic:
+            axes.set(**{f"{letter}scale": "log"})
+            low, high = axis.get_view_interval()
+            few = np.log10(high / low) < 4  # then there are ticks at 3 between powers of ten
+            axis.set_major_locator(LogLocator(subs=(1.0, 3.0) if few else (1.0,), numticks=9))
+            axis.set_minor_locator(NullLocator())
+            text = format_time if unit else partial(style.number, digits=2)
+            axis.set_major_formatter(FuncFormatter(lambda value, _, text=text: text(value)))
     axes.set_xlabel(x_title)
     if y_title:  # across the top: nobody turns the head
         axes.set_title(y_title, loc="left", fontsize=9, color=SOFT)
@@ -103,23 +109,21 @@ def draw_lines(
 
 
 def draw_line(axes: Axes, line: Line) -> None:
-    """One line in the look of its engine."""
     look = line.look
     x, y = (np.asarray(values, float) for values in (line.x, line.y))
-    seen = np.isfinite(x) & np.isfinite(y)
-    filled = [k for k in (line.filled,) if 0 <= k < len(x) and seen[k]]
+    finite = np.isfinite(x) & np.isfinite(y)
     dash: Any = (0, look.dash) if look.dash else "-"
     common = {"color": look.light, "linestyle": dash, "gid": line.name}
     if line.faint:
-        axes.plot(x[seen], y[seen], linewidth=0.8, alpha=0.4, **common)
+        axes.plot(x[finite], y[finite], linewidth=0.8, alpha=0.4, **common)
         return
     face = look.light if look.filled and line.filled < 0 else PAPER
-    axes.plot(x[seen], y[seen], marker=marker(look), markerfacecolor=face, **common)
+    axes.plot(x[finite], y[finite], marker=marker(look), markerfacecolor=face, **common)
+    filled = [k for k in (line.filled,) if 0 <= k < len(x) and finite[k]]
     axes.plot(x[filled], y[filled], marker=marker(look), color=look.light, linestyle="")
 
 
 def marker(look: style.Look) -> Any:
-    """The shape of a look as a marker of matplotlib."""
     from matplotlib.path import Path
 
     if look.shape == "circle":
@@ -128,33 +132,18 @@ def marker(look: style.Look) -> Any:
     for letter, numbers in re.findall(r"([MLHV])([^A-Z]*)", look.path):
         values = [float(text) for text in re.findall(r"-?[\d.]+", numbers)]
         if letter in "HV":
-            last = points[-1]
-            points.append((values[0], last[1]) if letter == "H" else (last[0], values[0]))
+            x, y = points[-1]
+            points.append((values[0], y) if letter == "H" else (x, values[0]))
         else:
             points += zip(values[::2], values[1::2])
     turned = [(x, -y) for x, y in [*points, points[0]]]  # y of SVG points down
     return Path(turned, closed=True)
 
 
-def label_decades(axis: Any, unit: str = "") -> None:
-    """Ticks of a logarithmic axis at powers of ten, and at 3 between them if these are few."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
-
-    low, high = axis.get_view_interval()
-    few = np.log10(high / low) < 4
-    axis.set_major_locator(LogLocator(subs=(1.0, 3.0) if few else (1.0,), numticks=9))
-    axis.set_minor_locator(NullLocator())
-    axis.set_major_formatter(FuncFormatter(lambda value, _: tick_text(value, unit)))
-
-
-def tick_text(value: float, unit: str = "") -> str:
-    """A value on an axis; with the unit µs as µs, ms or s."""
-    if unit == "µs":
-        for size, name in ((1e6, "s"), (1e3, "ms"), (1.0, "µs")):
-            if value >= 0.9 * size:
-                return f"{style.number(value / size, 2)} {name}"
-        return f"{style.number(value, 2)} µs"
-    return style.number(value, 2) + (f" {unit}" if unit else "")
+def format_time(value: float) -> str:
+    units = ((1e6, "s"), (1e3, "ms"), (1.0, "µs"))
+    size, unit = next((unit for unit in units if value >= 0.9 * unit[0]), units[-1])
+    return f"{style.number(value / size, 2)} {unit}"
 
 
 def label_lines(axes: Axes, lines: Sequence[Line]) -> None:
@@ -163,9 +152,12 @@ def label_lines(axes: Axes, lines: Sequence[Line]) -> None:
     Where all lines end at the right, the labels stand below each other there, with a thin line from
     each end.
     """
-    ends = [finite_ends(line) for line in lines]
-    lines = [line for line, end in zip(lines, ends) if end]
-    ends = [end for end in ends if end]
+    ends = []  # the points of each line that are drawn
+    for line in lines:
+        points = np.column_stack([np.asarray(line.x, float), np.asarray(line.y, float)])
+        ends.append(points[np.isfinite(points).all(axis=1)])
+    lines = [line for line, end in zip(lines, ends) if len(end)]
+    ends = [end for end in ends if len(end)]
     if not lines:
         return
     figure: Any = axes.figure
@@ -175,9 +167,8 @@ def label_lines(axes: Axes, lines: Sequence[Line]) -> None:
     height = 11.0 * figure.dpi / 72
     longest = 0.58 * height * max(len(line.label) for line in lines)
     left, bottom, width, tall = axes.get_position().bounds
-    right = min(
-        axes.transAxes.inverted().transform(axes.transData.transform(e[-1]))[0] for e in ends
-    )
+    to_pixels = axes.transData.transform
+    right = min(axes.transAxes.inverted().transform(to_pixels(end[-1]))[0] for end in ends)
     stacked = len(lines) > 1 and right > ENDS
     room = (longest + 30 if stacked else 0.5 * longest) / figure.bbox.width
     axes.set_position((left, bottom, width - room, tall))
@@ -189,27 +180,18 @@ def label_lines(axes: Axes, lines: Sequence[Line]) -> None:
             heights[k] = max(heights[k], heights[k - 1] + 1.1 * height)
         for k, y in zip(order, heights):
             x = axes.bbox.x1 + 8 - to_pixels(ends[k][-1])[0]
-            offset = (x * 72 / figure.dpi, (y - to_pixels(ends[k][-1])[1]) * 72 / figure.dpi)
-            write_label(axes, lines[k], ends[k][-1], offset, lead=True)
+            write_label(axes, lines[k], ends[k][-1], (x, y - to_pixels(ends[k][-1])[1]), lead=True)
         return
-    drawn = [to_pixels(np.array(end)) for end in ends]
+    drawn = [to_pixels(end) for end in ends]
     taken = np.vstack([dense(points) for points in drawn])
-    (left, bottom), (_, top) = to_pixels(
-        [(axes.get_xlim()[0], axes.get_ylim()[0]), (axes.get_xlim()[1], axes.get_ylim()[1])]
-    )
+    (left, bottom), (_, top) = to_pixels(list(zip(axes.get_xlim(), axes.get_ylim())))
     for line, end, points in zip(lines, ends, drawn):
         width = 0.55 * height * len(line.label)
+        beside = ((9, -4), (9, 5), (9, -13), (-9 - width, -4), (-width / 2, 9), (-width / 2, -19))
         choices: list[Any] = []
-        for point, anchor in ((points[-1], end[-1]), (points[0], end[0])):
-            for dx, dy in (
-                (9, -4),
-                (9, 5),
-                (9, -13),
-                (-9 - width, -4),
-                (-width / 2, 9),
-                (-width / 2, -19),
-            ):
-                x, y = point[0] + dx, point[1] + dy
+        for (at_x, at_y), anchor in ((points[-1], end[-1]), (points[0], end[0])):
+            for dx, dy in beside:
+                x, y = at_x + dx, at_y + dy
                 covers = (
                     (taken[:, 0] > x - 8)
                     & (taken[:, 0] < x + width + 8)
@@ -221,41 +203,28 @@ def label_lines(axes: Axes, lines: Sequence[Line]) -> None:
                 )
                 choices.append((covers + 99 * outside + 0.01 * len(choices), dx, dy, anchor, x, y))
         _, dx, dy, anchor, x, y = min(choices, key=lambda choice: choice[0])
-        write_label(axes, line, anchor, (dx * 72 / figure.dpi, dy * 72 / figure.dpi))
+        write_label(axes, line, anchor, (dx, dy))
         box = [
             (x + width * u, y + height * v) for u in np.linspace(0, 1, 9) for v in (0.1, 0.5, 0.9)
         ]
         taken = np.vstack([taken, box])
 
 
-def finite_ends(line: Line) -> list[tuple[float, float]]:
-    """The points of a line that are drawn."""
-    points = zip(np.asarray(line.x, float), np.asarray(line.y, float))
-    return [(x, y) for x, y in points if np.isfinite(x) and np.isfinite(y)]
-
-
 def dense(points: Any) -> Any:
-    """Points along a line through these, in pixels."""
-    parts = [points]
-    for start, end in pairwise(points):
-        parts.append(start + np.linspace(0, 1, 12)[:, None] * (end - start))
-    return np.vstack(parts)
+    steps = np.linspace(0, 1, 12)[:, None]
+    return np.vstack([points, *(start + steps * (end - start) for start, end in pairwise(points))])
 
 
 def write_label(
-    axes: Axes,
-    line: Line,
-    end: tuple[float, float],
-    offset: tuple[float, float],
-    lead: bool = False,
+    axes: Axes, line: Line, end: Any, offset: tuple[float, float], lead: bool = False
 ) -> None:
-    """The label of a line, this far from its end in points, in its colour."""
-    colour = line.look.light
+    """The label of a line, this far from its end in pixels, in its colour."""
+    colour, points = line.look.light, 72 / axes.figure.dpi
     arrow = {"arrowstyle": "-", "color": colour, "linewidth": 0.6, "shrinkA": 0, "shrinkB": 4}
     axes.annotate(
-        line.label, end, offset, textcoords="offset points", color=colour, weight="bold",
-        va="center" if lead else "baseline", arrowprops=arrow if lead else None,
-        annotation_clip=False,
+        line.label, end, (offset[0] * points, offset[1] * points), textcoords="offset points",
+        color=colour, weight="bold", va="center" if lead else "baseline",
+        arrowprops=arrow if lead else None, annotation_clip=False,
     )  # fmt: skip
 
 
@@ -277,26 +246,14 @@ def svg_of(figure: Figure, label: str, alone: bool = False) -> Markup:
     # in attributes only: a label 0.003 stays
     text = re.sub(r'"[^"]*"', lambda m: re.sub(r"(\d+\.\d\d)\d+", r"\1", m[0]), text)
     text = re.sub(r"\n\s*", "\n", text)
-    text = text.replace("font: ", "font-family:inherit;font: ") if not alone else text
-    text = re.sub(r' width="[\d.]+pt"| height="[\d.]+pt"', "", text, count=2) if not alone else text
     role = f'<svg role="img" aria-label="{Markup.escape(label)}"'
-    return Markup(text.replace("<svg", role, 1) if alone else themed(text.replace("<svg", role, 1)))
-
-
-def themed(text: str) -> str:
-    """SVG with each colour as a variable of the page, which a dark page changes."""
-    found = set(re.findall(r"#[0-9a-f]{6}", text))
-    for colour in found & {*VARIABLES, *colours()}:
-        name = VARIABLES.get(colour) or variable(colour)
-        text = text.replace(colour, f"var({name},{colour})")
-    return text
-
-
-def colours() -> Mapping[str, str]:
-    """The light colour of every mark -> the dark one."""
-    return {mark.light: mark.dark for mark in style.marks()}
-
-
-def variable(colour: str) -> str:
-    """The variable of a page with the colour that is this one on a light page."""
-    return f"--{colour.removeprefix('#')}"
+    if alone:
+        return Markup(text.replace("<svg", role, 1))
+    text = text.replace("font: ", "font-family:inherit;font: ")
+    text = re.sub(r' width="[\d.]+pt"| height="[\d.]+pt"', "", text, count=2)
+    text = text.replace("<svg", role, 1)
+    # each colour as a variable of the page, which a dark page changes
+    names = {mark.light: f"--{mark.light.removeprefix('#')}" for mark in style.marks()} | VARIABLES
+    for colour in set(re.findall(r"#[0-9a-f]{6}", text)) & names.keys():
+        text = text.replace(colour, f"var({names[colour]},{colour})")
+    return Markup(text)

@@ -12,10 +12,10 @@ import pandas as pd
 from markupsafe import Markup
 
 from crosscheck2d.reports.page import style
-from crosscheck2d.reports.page.documents import deflated, environment, render
+from crosscheck2d.reports.page.documents import ENGINE, deflated, environment, render
 from crosscheck2d.reports.page.links import Neighbour
 
-SCRIPTS = ("page/player.js", "page/player_canvas.js", "page/panels.js", "page/kit.js")
+SCRIPTS = (*ENGINE, "page/kit.js")
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class TableCell:
         value: a number is formatted by `style.number`; text stands as it is.
         title: what is shown where the mouse points at it.
         link: an address; `#id` opens the row, the section or the fold of that id.
-        css: classes of page.css: best, bad, soft, ...
+        css: classes of kit.css: best, bad, soft, ...
         side: small, at the right of the value.
         notes: small, a line each, below the value.
         span: columns that it covers.
@@ -41,18 +41,11 @@ class TableCell:
     span: int = 1
 
     @property
-    def plain(self) -> bool:
-        """Whether it is its text alone."""
-        return not (self.link or self.side or self.notes)
-
-    @property
     def text(self) -> str | Markup:
-        """The value as text."""
         return self.value if isinstance(self.value, str) else style.number(self.value)
 
 
 def as_cell(value: Any) -> TableCell:
-    """What a frame holds, as a cell."""
     return value if isinstance(value, TableCell) else TableCell(value)
 
 
@@ -67,7 +60,7 @@ class Table:
         opens: text of a row's heading -> the parts that its click, or the link `#text` (a blank is
             `_` there), shows below the row; they are packed, and drawn when they are opened.
         sortable: whether a heading sorts, and a field filters the rows.
-        css: classes of page.css: main (fixed columns), map (small marks), stack (on a phone each
+        css: classes of kit.css: main (fixed columns), map (small marks), stack (on a phone each
             row is a block), text (cells break), plain.
         corner: the heading of the column of row headings.
         caption: a sentence below.
@@ -85,18 +78,16 @@ class Table:
 
     @property
     def over(self) -> list[tuple[TableCell, int]]:
-        """(heading, number of columns) above the columns."""
         return [(as_cell(title), columns) for title, columns in self.spans]
 
     @property
     def heads(self) -> list[TableCell]:
-        """The headings of the columns."""
         return [as_cell(name) for name in self.frame.columns]
 
     @property
     def rows(self) -> list[tuple[TableCell | None, TableCell, list[TableCell]]]:
         """(title of a group that begins here, heading, cells) of each row."""
-        found, before = [], None
+        rows, before = [], None
         groups = self.groups or [""] * len(self.frame)
         columns = [list(self.frame.iloc[:, k]) for k in range(self.frame.shape[1])]
         for k, (label, group) in enumerate(zip(self.frame.index, groups)):
@@ -105,20 +96,17 @@ class Table:
                 cells.append(as_cell(columns[column][k]))
                 column += cells[-1].span
             title = as_cell(group) if group and group != before else None
-            found.append((title, as_cell(label), cells))
+            rows.append((title, as_cell(label), cells))
             before = group
-        return found
+        return rows
 
     def packed(self, label: str) -> str:
-        """The parts below a row, as HTML, deflated."""
         macros: Any = environment().get_template("page/kit_parts.html.j2").module
         return deflated(str(macros.parts(self.opens[label])))
 
 
 @dataclass(frozen=True, eq=False)
 class Chart:
-    """A picture of `drawing.svg_of`, with its title and a sentence."""
-
     svg: str
     title: str = ""
     caption: str = ""
@@ -127,10 +115,10 @@ class Chart:
 
 @dataclass(frozen=True, eq=False)
 class Playback:
-    """Trajectories that play, as `replay.pack_layers` packs them.
+    """Trajectories that play.
 
     Attributes:
-        pack: the packed layers.
+        pack: the packed layers, `replay.pack_layers`.
         ratio: height over width of the view, `replay.ratio_of`.
         label: what it shows, in words.
         caption: a sentence below.
@@ -159,8 +147,6 @@ class Text:
 
 @dataclass(frozen=True, eq=False)
 class Code:
-    """Lines to copy, with a button that does."""
-
     source: str
     kind: ClassVar[str] = "code"
 
@@ -213,7 +199,6 @@ class Page:
 
 
 def render_page(page: Page) -> str:
-    """The page as HTML."""
     return render(
         "page/kit.html.j2",
         generator=page.generator,
@@ -225,7 +210,6 @@ def render_page(page: Page) -> str:
 
 
 def run_section(about: Mapping[str, Any]) -> Section:
-    """The command, the machine and the versions of a run, folded."""
     facts = {
         "Command": about.get("command", ""),
         "Seed": about.get("seed", ""),

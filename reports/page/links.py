@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 
 class Neighbour(NamedTuple):
-    """A page: its title and content, the command that makes it, and its address; in `PAGES` below
-    the folder of all results, in a page relative to it, "" if it does not exist."""
+    """A page; `href`: in `PAGES` below the folder of all results, in a page relative to it, "" if
+    it does not exist."""
 
     title: str
     says: str
@@ -42,14 +42,12 @@ PAGES = {
 
 
 def neighbours(page: Path, own: str) -> list[Neighbour]:
-    """The pages of `PAGES` besides `own`, as seen from the file `page`.
-
-    A page is looked for at its default path, beside the folder of `page`. A folder that is being
-    written is beside its final place, so links found from it are right.
-    """
+    """The pages of `PAGES` besides `own`, as seen from the file `page`: each is looked for at its
+    default path, beside the folder of `page`."""
+    # a folder that is being written is beside its final place, so links found from it are right
     beside = page.absolute().parent.parent
     return [
-        other._replace(href=f"../{other.href}" if (beside / other.href).is_file() else "")
-        for key, other in PAGES.items()
+        page._replace(href=f"../{page.href}" if (beside / page.href).is_file() else "")
+        for key, page in PAGES.items()
         if key != own
     ]

@@ -12,15 +12,11 @@ Said = tuple[str, Sequence[str]]
 
 
 def sourced(sentence: str, lines: Sequence[str]) -> Markup:
-    """A sentence, and below it the lines of the file and the formula, as `Said` has them."""
-    below = (
-        Markup("<br><small>{} <code>{}</code></small>").format(*line.split(": ", 1))
-        for line in lines
-    )
-    return Markup("{}{}").format(sentence, Markup("").join(below))
+    small = Markup("<br><small>{} <code>{}</code></small>")
+    return Markup("").join([sentence, *(small.format(*line.split(": ", 1)) for line in lines)])
 
 
 def with_lines(says: Sequence[str], shown: Sequence[Sequence[str]]) -> list[Said]:
-    """Each sentence with what is shown of it; a sentence that is no fault has nothing."""
+    """Each sentence with its lines; a sentence that is no fault has none."""
     none: list[Sequence[str]] = [[]] * len(says)
     return list(zip(says, [*shown, *none]))

@@ -8,15 +8,13 @@ import numpy as np
 import pandas as pd
 from markupsafe import Markup
 
+from crosscheck2d.adapters.advance import off_grid_note
 from crosscheck2d.adapters.engines import OWN
-from crosscheck2d.adapters.thrust_grid import off_grid_note
 from crosscheck2d.reports.compare.fast_disks import fast_note
 from crosscheck2d.reports.compare.metrics import METRICS
 from crosscheck2d.reports.compare.verdicts import VERDICTS
-from crosscheck2d.reports.page import style
+from crosscheck2d.reports.page import replay, style
 from crosscheck2d.reports.page.kit import Part, Playback, Section, Table, TableCell, Text
-from crosscheck2d.reports.page.replay import pack_layers, ratio_of, view_of
-from crosscheck2d.reports.page.replay import played as drawn
 from crosscheck2d.reports.page.scenes import (
     EXACT,
     LOST,
@@ -29,7 +27,7 @@ from crosscheck2d.reports.page.scenes import (
     values,
 )
 from crosscheck2d.reports.page.situations import FRICTION, SPIN
-from crosscheck2d.reports.page.summary import MEANING, Summary, error_text, played, step_text
+from crosscheck2d.reports.page.summary import MEANING, Summary, error_text, stand_in, step_text
 
 GRADES = (
     (EXACT, "exact", "="),
@@ -44,29 +42,37 @@ SPECIAL = ("reference:exercise", "reference:lesson", "reference:ordered", "event
 
 
 def map_section(summary: Summary) -> Section:
-    """A row for each scene, in groups by situation."""
-    groups = columns(summary)
-    names = [name for _, of in groups for name in of]
+    groups = [(label(names[0]), names) for names in summary.profiles.values()]
+    own = [name for name in summary.names if name.endswith(OWN)]
+    ours = [name for name in SPECIAL if name in summary.names]
+    placed = {*own, *ours, "reference:coulomb", *(name for _, names in groups for name in names)}
+    rest = [name for name in summary.names if name not in placed]
+    groups += [("others", rest), ("yours", own), ("ours", ours)]
+    groups = [(title, names) for title, names in groups if names]
     order = [kind for kind in MEANING if kind not in (SPIN, FRICTION)] + [FRICTION]
     scenes = sorted(summary.scenes, key=lambda scene: order.index(scene.situations[0]))
-    starts = {of[0] for _, of in groups}
-    rows = [
-        [TableCell(scene.comparison.scenario.asks, css="ask")]
-        + [mark(scene, name, name in starts) for name in names]
-        for scene in scenes
-    ]
-    heads = [TableCell("", css="ask")] + [
-        TableCell(
-            short_name(name), name.replace(":", " "), css="mark" + " first" * (name in starts)
-        )
-        for name in names
-    ]
-    frame = pd.DataFrame(rows, [title_of(scene) for scene in scenes], dtype=object)
+    rows = [[TableCell(scene.comparison.scenario.asks, css="ask")] for scene in scenes]
+    heads, spans = [TableCell("", css="ask")], list[tuple[str | TableCell, int]]([("", 1)])
+    for title, names in groups:
+        # in as many lines as it has words
+        spans.append((TableCell(Markup("<br>").join(title.split()), css="first"), len(names)))
+        for name in names:
+            css = "mark" + " first" * (name == names[0])
+            profile = name.rpartition(":")[2]
+            short = "ev" if name.startswith("event") else profile[: 1 if is_library(name) else 2]
+            heads.append(TableCell(short, name.replace(":", " "), css=css))
+            for scene, row in zip(scenes, rows):
+                row.append(mark(scene, name, " first" * (name == names[0])))
+    titles = [title_of(scene) for scene in scenes]
+    frame = pd.DataFrame(rows, titles, dtype=object).set_axis(heads, axis="columns")
+    kinds = [scene.situations[0] for scene in scenes]
+    small = Markup("{} <small>{}</small>")
+    opens = [[*replays(scene, summary), *remarks(scene), *numbers(scene)] for scene in scenes]
     table = Table(
-        frame.set_axis(heads, axis="columns"),
-        groups=[group(scene) for scene in scenes],
-        spans=[("", 1), *((TableCell(over(title), css="first"), len(of)) for title, of in groups)],
-        opens={title_of(scene): opening(scene, summary) for scene in scenes},
+        frame,
+        groups=[TableCell(small.format(kind, MEANING[kind])) for kind in kinds],
+        spans=spans,
+        opens=dict(zip(titles, opens)),
         css="map",
     )
     key = Markup("").join(
@@ -81,67 +87,28 @@ def map_section(summary: Summary) -> Section:
     return Section("All scenes", says, [table], id="scenes")
 
 
-def columns(summary: Summary) -> list[tuple[str, list[str]]]:
-    """(title, names) of the groups of columns."""
-    groups = [(label(of[0]), of) for of in summary.profiles.values()]
-    own = [name for name in summary.names if name.endswith(OWN)]
-    ours = [name for name in SPECIAL if name in summary.names]
-    rest = [
-        name
-        for name in summary.names
-        if name not in [*own, *ours, "reference:coulomb"]
-        and not any(name in of for _, of in groups)
-    ]
-    return [each for each in [*groups, ("others", rest), ("yours", own), ("ours", ours)] if each[1]]
-
-
-def over(title: str) -> Markup:
-    """The heading of a group of columns, in as many lines as it has words."""
-    return Markup("<br>").join(title.split())
-
-
-def short_name(name: str) -> str:
-    """A column in a letter or two."""
-    profile = name.rpartition(":")[2]
-    return "ev" if name.startswith("event") else profile[:1] if is_library(name) else profile[:2]
-
-
 def title_of(scene: SceneScores) -> str:
-    """The name of a scene as its heading."""
     return scene.name.replace("_", " ")
 
 
-def group(scene: SceneScores) -> TableCell:
-    """The heading of a group of scenes."""
-    kind = scene.situations[0]
-    return TableCell(Markup("{} <small>{}</small>").format(kind, MEANING[kind]))
-
-
-def mark(scene: SceneScores, name: str, starts: bool) -> TableCell:
-    """A cell of the map: a sign by the size of the error, which words explain."""
-    name = played(name, scene)
+def mark(scene: SceneScores, name: str, first: str) -> TableCell:
+    name = stand_in(name, scene)
     error = scene.error(name)
-    runs = {run.name for run in scene.comparison.runs}
-    if name in scene.refused or name not in runs or np.isnan(error):
+    if name in scene.refused or np.isnan(error):
         grade, sign = NOT_PLAYED, "–"
-        why = scene.refused.get(name, "not played" if name not in runs else "no exact answer")
+        played = any(run.name == name for run in scene.comparison.runs)
+        reason = scene.refused.get(name, "no exact answer" if played else "not played")
     else:
         grade = next(k for k, (top, _, _) in enumerate(GRADES) if error < top or np.isinf(top))
         sign = GRADES[grade][2]
-        words = scene.words(name)
-        why = "; ".join([error_text(scene.raw_error(name)) + " radii", *words])
-    title = f"{name.replace(':', ' ')}: {why}".replace("exact radii", "exact")
-    return TableCell(sign, title, css=f"mark g{grade}" + " first" * starts)
+        reason = "; ".join([error_text(scene.raw_error(name)) + " radii", *scene.words(name)])
+    title = f"{name.replace(':', ' ')}: {reason}".replace("exact radii", "exact")
+    return TableCell(sign, title, css=f"mark g{grade}{first}")
 
 
-def opening(scene: SceneScores, summary: Summary) -> list[Part]:
-    """What a row opens: replays side by side, what is to be said, and the numbers."""
-    return [*replay(scene, summary), *remarks(scene), *numbers(scene)]
-
-
-def replay(scene: SceneScores, summary: Summary) -> list[Part]:
-    """The replays, three engines ticked."""
-    layers = drawn(scene.comparison)
+def replays(scene: SceneScores, summary: Summary) -> list[Part]:
+    scenario = scene.comparison.scenario
+    layers = replay.played(scene.comparison)
     names = [run.name for run, _ in layers if run is not None]
     if not names:
         return []
@@ -149,16 +116,15 @@ def replay(scene: SceneScores, summary: Summary) -> list[Part]:
     facts = {
         "key": scene.name,
         "panels": True,
-        "asks": scene.comparison.scenario.asks,
+        "asks": scenario.asks,
         "ticked": ticked,
         "notes": notes,
         "labels": {name: long_label(name) for name in names},
         "words": {name: "; ".join(words) for name in names if (words := scene.words(name))},
         "errors": {name: error_text(scene.raw_error(name)) for name in names if scene.counts},
     }
-    pack = pack_layers(scene.comparison.scenario, layers, more=facts)
-    ratio = ratio_of(scene.comparison.scenario, layers)
-    return [Playback(pack, ratio, f"Replays of {title_of(scene)}")]
+    pack = replay.pack_layers(scenario, layers, more=facts)
+    return [Playback(pack, replay.ratio_of(scenario, layers), f"Replays of {title_of(scene)}")]
 
 
 def to_tick(
@@ -168,95 +134,84 @@ def to_tick(
     library and the farthest. If the farthest cannot be told from the exact answer by eye, one that
     can, but none that is lost in most scenes."""
     own = [name for name in names if name.endswith(OWN)]
-    first = own or [name for name in (played(OURS[0], scene), *names) if name in names]
+    first = own or [name for name in (stand_in(OURS[0], scene), *names) if name in names]
     libraries = [name for name in summary.libraries if name in names and scene.counts]
     if not libraries:
         return list(names[:3]), {}
-    lost_first = scene.hopeless
 
     def order(name: str) -> tuple[float, float]:
-        held = -scene.follows.get(name, np.inf) if lost_first else 0.0
+        held = -scene.follows.get(name, np.inf) if scene.hopeless else 0.0
         return (held, scene.raw_error(name) if np.isfinite(scene.raw_error(name)) else np.inf)
 
     ranked = sorted(libraries, key=order)
-    farthest = ranked[-1]
-    layers = [trajectory for _, trajectory in drawn(scene.comparison)]
-    left, bottom, right, top = view_of(scene.comparison.scenario, layers)
+    nearest, farthest = ranked[0], ranked[-1]
+    scenario = scene.comparison.scenario
+    layers = [trajectory for _, trajectory in replay.played(scene.comparison)]
+    left, bottom, right, top = replay.view_of(scenario, layers)
     size = min(PIXELS[0] / (right - left), PIXELS[1] / (top - bottom))
-    radius = scene.comparison.scenario.scene.radius.max() * size
-    if scene.raw_error(farthest) * radius < VISIBLE:
+    if scene.raw_error(farthest) * scenario.scene.radius.max() * size < VISIBLE:
         others = [name for of in summary.profiles.values() for name in of if name in names]
         usable = [name for name in others if name not in summary.hopeless] or libraries
         farthest = max(usable, key=lambda name: np.nan_to_num(scene.raw_error(name)))
-    words = ("follows longest", "lost first") if lost_first else ("nearest library", "farthest")
-    ticked = list(dict.fromkeys([first[0], ranked[0], farthest]))
-    return ticked, {farthest: words[1], ranked[0]: words[0]}
+    words = ("follows longest", "lost first") if scene.hopeless else ("nearest library", "farthest")
+    ticked = list(dict.fromkeys([first[0], nearest, farthest]))
+    return ticked, {farthest: words[1], nearest: words[0]}
 
 
 def remarks(scene: SceneScores) -> list[Part]:
-    """Where the scene comes from, why it has no exact answer, who refused it, and what a step of
-    it may miss."""
-    comparison = scene.comparison
-    scenario, truth = comparison.scenario, comparison.truth
-    told = [f"Source: {scenario.source}."] if scenario.source and truth is not None else []
+    scenario, truth = scene.comparison.scenario, scene.comparison.truth
+    sentences = [f"Source: {scenario.source}."] if scenario.source and truth is not None else []
     if truth is None:
-        told.append(f"No exact answer: {scenario.without_truth}.")
+        sentences.append(f"No exact answer: {scenario.without_truth}.")
     elif truth.reason:
-        told.append(f"The exact answer ends at {style.number(truth.horizon)} s: {truth.reason}.")
+        end = style.number(truth.horizon)
+        sentences.append(f"The exact answer ends at {end} s: {truth.reason}.")
     if note := off_grid_note(scenario):
-        told.append(f"{note[0].upper()}{note[1:].removesuffix('.')}.")
-    if note := fast_note(comparison):
-        told.append(note)
+        sentences.append(f"{note[0].upper()}{note[1:].removesuffix('.')}.")
+    if note := fast_note(scene.comparison):
+        sentences.append(note)
     by_reason: dict[str, list[str]] = {}
-    for name, why in scene.refused.items():
-        by_reason.setdefault(why, []).append(long_label(name))
-    told += [f"Not played by {', '.join(names)}: {why}." for why, names in by_reason.items()]
-    return [Text([" ".join(told)], css="soft")] if told else []
+    for name, reason in scene.refused.items():
+        by_reason.setdefault(reason, []).append(long_label(name))
+    sentences += [f"Not played by {', '.join(of)}: {reason}." for reason, of in by_reason.items()]
+    return [Text([" ".join(sentences)], css="soft")] if sentences else []
 
 
 def numbers(scene: SceneScores) -> list[Section]:
     """Every number of every engine at the middle step size, folded; failed verdicts first."""
     comparison = scene.comparison
-    found = values(comparison)
-    names = [run.name for run in comparison.middle_runs if run.status == "ok"]
-    if not found:
+    cells = values(comparison)
+    if not cells:
         return []
-    failed = {verdict for name in names for verdict, _ in scene.verdicts(name)}
-    ids = [
-        *[v for v in VERDICTS if v in failed],
-        *METRICS,
-        *[v for v in VERDICTS if v not in failed],
-    ]
-    ids = [each for each in ids if any((name, each) in found for name in names)]
-    rows = []
-    for each in ids:
-        bad = {name for name in names if each in dict(scene.verdicts(name))}
-        row = [found.get((name, each)) for name in names]
+    names = [run.name for run in comparison.middle_runs if run.status == "ok"]
+    fails = {(name, verdict) for name in names for verdict, _ in scene.verdicts(name)}
+    failed = [verdict for verdict in VERDICTS if any((name, verdict) in fails for name in names)]
+    index, rows = [], []
+    for row in dict.fromkeys([*failed, *METRICS, *VERDICTS]):
+        if not any((name, row) in cells for name in names):
+            continue
+        if row in VERDICTS:
+            means, unit = VERDICTS[row].means, VERDICTS[row].unit
+            index.append(TableCell(means[0].upper() + means[1:], f"verdict {row}, {unit}"))
+        else:
+            metric = METRICS[row]
+            unit = "" if metric.unit == "1" else f", {metric.unit}"
+            index.append(TableCell((metric.title or row) + unit, metric.summary))
         rows.append(
             [
-                TableCell(value.text, value.remark, css="bad" * (name in bad)) if value else ""
-                for name, value in zip(names, row)
+                TableCell(cell.text, cell.remark, css="bad" * ((name, row) in fails))
+                if (cell := cells.get((name, row)))
+                else ""
+                for name in names
             ]
         )
-    index = [heading(each) for each in ids]
-    heads = [TableCell(label(name), name, notes=(TableCell(profile(name)),)) for name in names]
+    profiles = [name.rpartition(":")[2] if is_library(name) else "" for name in names]
+    heads = [
+        TableCell(label(name), name, notes=(TableCell(profile),))
+        for name, profile in zip(names, profiles)
+    ]
     frame = pd.DataFrame(rows, index, dtype=object)
-    decide = "; ".join(VERDICTS[each].means for each in VERDICTS if each in failed)
+    decide = "; ".join(VERDICTS[verdict].means for verdict in failed)
     says = f"at a step of {step_text(comparison.middle_dt)}; what fails: {decide or 'nothing'}"
     table = Table(frame.set_axis(heads, axis="columns"), css="plain number")
     return [Section("Numbers of all engines", says, [table], folded=True)]
-
-
-def profile(name: str) -> str:
-    """The profile of a library, or nothing."""
-    return name.rpartition(":")[2] if is_library(name) else ""
-
-
-def heading(each: str) -> TableCell:
-    """A metric or a verdict as the heading of a row."""
-    if each in VERDICTS:
-        kind = VERDICTS[each]
-        return TableCell(kind.means[0].upper() + kind.means[1:], f"verdict {each}, {kind.unit}")
-    metric = METRICS[each]
-    unit = "" if metric.unit == "1" else f", {metric.unit}"
-    return TableCell((metric.title or each) + unit, metric.summary)

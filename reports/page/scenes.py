@@ -3,12 +3,13 @@ an engine follows the exact answer."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 
 from crosscheck2d.adapters.engines import OWN, known_row
 from crosscheck2d.reports.compare import laws
@@ -47,12 +48,10 @@ class TableNumber(NamedTuple):
 
     @property
     def judged(self) -> bool:
-        """Whether it counts."""
         return not np.isnan(self.value)
 
     @property
     def text(self) -> str:
-        """The text in a table."""
         return number(self.value) if self.judged else NOT_JUDGED
 
 
@@ -64,108 +63,87 @@ def values(comparison: Comparison) -> Numbers:
     """The numbers of a scenario at the middle dt, against the truth or else the laws of physics."""
     table = comparison.table
     near = table.dt_s == comparison.middle_dt
-    found: Numbers = {}
+    several = comparison.scenario.scene.n > 1
+    numbers: Numbers = {}
     for versus in (ITSELF, TRUTH):  # the truth comes last and replaces the laws
         rows = table[near & (table.versus == versus) & table.metric.isin([*METRICS, *VERDICTS])]
         for row in rows.to_dict("records"):
-            where = (
-                f"disk {row['disk']}"
-                if row["disk"] >= 0 and comparison.scenario.scene.n > 1
-                else ""
-            )
-            when = f"at {row['at_s']:.4g} s" if np.isfinite(row["at_s"]) else ""
-            remark = ", ".join(filter(None, (where, when, str(row["note"]))))
-            found[f"{row['engine']}:{row['profile']}", str(row["metric"])] = TableNumber(
-                row["value"], remark
-            )
-    return found
+            disk = f"disk {row['disk']}" if row["disk"] >= 0 and several else ""
+            instant = f"at {row['at_s']:.4g} s" if np.isfinite(row["at_s"]) else ""
+            remark = ", ".join(filter(None, (disk, instant, str(row["note"]))))
+            name = f"{row['engine']}:{row['profile']}"
+            numbers[name, str(row["metric"])] = TableNumber(row["value"], remark)
+    return numbers
 
 
 @dataclass(frozen=True, eq=False)
 class SceneScores:
-    """A scene of a run.
-
-    Attributes:
-        comparison: its runs and their table.
-        situations: as `situations_of`.
-    """
+    """A scene of a run, its situations as `situations_of`. Engines are named `engine:profile`."""
 
     comparison: Comparison
     situations: Sequence[str]
 
     @property
     def name(self) -> str:
-        """Its name."""
         return self.comparison.scenario.name
 
     @cached_property
-    def numbers(self) -> dict[tuple[str, float], Mapping[str, float]]:
-        """(`engine:profile`, dt in s) -> the position error in radii and the angle error in rad,
+    def errors(self) -> dict[tuple[str, float, str], float]:
+        """(engine, dt in s, metric) -> the position error in radii and the angle error in rad,
         where they are judged."""
         table = self.comparison.table
         rows = table[(table.versus == TRUTH) & table.metric.isin([ERROR, ANGLE])]
-        rows = rows[rows.value.notna()]
-        found: dict[tuple[str, float], dict[str, float]] = {}
-        for name, profile, dt, metric, value in zip(
-            rows.engine, rows.profile, rows.dt_s, rows.metric, rows.value
-        ):
-            found.setdefault((f"{name}:{profile}", float(dt)), {})[metric] = float(value)
-        return dict(found)
+        return values_by(rows[rows.value.notna()])
 
     @cached_property
     def failed(self) -> dict[tuple[str, float], list[tuple[str, float]]]:
-        """(`engine:profile`, dt in s) -> (id, value) of each verdict that the run fails, the
-        gravest first."""
-        rows = fails(self.comparison.table)
-        found: dict[tuple[str, float], list[tuple[str, float]]] = {}
-        for name, profile, dt, verdict, value in zip(
-            rows.engine, rows.profile, rows.dt_s, rows.metric, rows.value
-        ):
-            found.setdefault((f"{name}:{profile}", float(dt)), []).append((verdict, float(value)))
-        return found
+        """(engine, dt in s) -> (id, value) of each verdict that the run fails, the gravest
+        first."""
+        failed: dict[tuple[str, float], list[tuple[str, float]]] = {}
+        for (name, dt, verdict), value in values_by(fails(self.comparison.table)).items():
+            failed.setdefault((name, dt), []).append((verdict, value))
+        return failed
 
     @cached_property
     def statuses(self) -> dict[tuple[str, float], str]:
-        """(`engine:profile`, dt in s) -> how the run ended."""
         return {(run.name, run.dt): run.status for run in self.comparison.runs}
 
     @cached_property
     def refused(self) -> dict[str, str]:
-        """`engine:profile` -> why it has no result at the middle step size."""
+        """Engine -> why it has no result at the middle step size."""
         return {run.name: run.reason for run in self.comparison.middle_runs if run.status != "ok"}
 
     @cached_property
     def frictionless(self) -> set[str]:
-        """`engine:profile` of those that refuse the scene because they model no friction."""
         return {run.name for run in self.comparison.middle_runs if run.frictionless}
 
     @cached_property
     def counts(self) -> bool:
-        """Whether it has enough of an exact answer to score engines."""
-        return scored(self.comparison)
+        """Whether it has an exact answer for at least `LEAST_SHARE` of its samples after the
+        start: before that, the disks of a pile have met nothing."""
+        truth, intervals = self.comparison.truth, self.comparison.scenario.intervals
+        return truth is not None and len(truth) - 1 >= max(1.0, LEAST_SHARE * intervals)
 
     def error(self, name: str, dt: float | None = None, metric: str = ERROR) -> float:
         """The error of an engine, inf where it has no result or fails a verdict; nan where there is
         nothing to compare with."""
-        key = (name, self.comparison.middle_dt if dt is None else dt)
-        status = self.statuses.get(key)
+        dt = self.comparison.middle_dt if dt is None else dt
+        status = self.statuses.get((name, dt))
         if status is None or (name.endswith(OWN) and status == "unsupported"):
             return np.nan
-        if key in self.failed or status != "ok":
+        if (name, dt) in self.failed or status != "ok":
             return np.inf
-        return self.numbers.get(key, {}).get(metric, np.inf) if self.counts else np.nan
+        return self.errors.get((name, dt, metric), np.inf) if self.counts else np.nan
 
     def raw_error(self, name: str) -> float:
-        """The position error of a run at the middle step size, whatever verdict it fails."""
-        key = (name, self.comparison.middle_dt)
-        return self.numbers.get(key, {}).get(ERROR, np.nan) if self.counts else np.nan
+        key = (name, self.comparison.middle_dt, ERROR)
+        return self.errors.get(key, np.nan) if self.counts else np.nan
 
     def refuses(self, name: str) -> bool:
-        """Whether an engine refuses the scene."""
         return self.statuses.get((name, self.comparison.middle_dt)) == "unsupported"
 
     def is_lost(self, name: str) -> bool:
-        """Whether an engine fails, or is more than a radius off; a refusal is neither."""
+        # a refusal is no loss
         return self.error(name) > LOST and not self.refuses(name)
 
     def verdicts(self, name: str) -> list[tuple[str, float]]:
@@ -173,59 +151,44 @@ class SceneScores:
         return self.failed.get((name, self.comparison.middle_dt), [])
 
     def words(self, name: str) -> list[str]:
-        """The same in words, or why it was not played; then whether it is a radius off."""
         if name in self.refused:
             return [self.refused[name]]
-        said = [in_words(verdict, value) for verdict, value in self.verdicts(name)]
+        words = [in_words(verdict, value) for verdict, value in self.verdicts(name)]
         if self.raw_error(name) > LOST:
             end = self.comparison.scenario.duration
-            said.append(f"a radius off after {self.follows.get(name, end):.2g} of {end:.2g} s")
-        return said
+            words.append(f"a radius off after {self.follows.get(name, end):.2g} of {end:.2g} s")
+        return words
 
     @cached_property
     def follows(self) -> dict[str, float]:
-        """`engine:profile` -> s, when a disk is first a radius off; inf if none is."""
+        # engine -> s, when a disk is first a radius off; inf if none is
         truth, scene = self.comparison.truth, self.comparison.scenario.scene
-        found = {}
-        for run in self.comparison.middle_runs if truth is not None else ():
-            if run.trajectory is None or truth is None:
-                continue
-            off = (laws.deviation(run.trajectory, truth, scene) > LOST * scene.radius).any(axis=1)
-            found[run.name] = float(truth.t[int(np.argmax(off))]) if off.any() else np.inf
-        return found
-
-    @property
-    def known_until(self) -> float:
-        """s, the end of the exact answer."""
-        truth = self.comparison.truth
-        return np.nan if truth is None else float(truth.t[-1])
+        times = {}
+        for run in self.comparison.middle_runs:
+            if run.trajectory is not None and truth is not None:
+                off = laws.deviation(run.trajectory, truth, scene) > LOST * scene.radius
+                first = int(np.argmax(off.any(axis=1)))
+                times[run.name] = float(truth.t[first]) if off.any() else np.inf
+        return times
 
     @cached_property
     def hopeless(self) -> bool:
         """Whether every library that was played is a radius off."""
-        errors = [self.raw_error(run.name) for run in self.comparison.middle_runs]
-        libraries = [
-            error
-            for run, error in zip(self.comparison.middle_runs, errors)
-            if is_library(run.name) and not np.isnan(error)
-        ]
-        return bool(libraries) and min(libraries) > LOST
+        names = [run.name for run in self.comparison.middle_runs if is_library(run.name)]
+        errors = [error for name in names if not np.isnan(error := self.raw_error(name))]
+        return bool(errors) and min(errors) > LOST
 
 
-def scored(comparison: Comparison) -> bool:
-    """Whether a scene has an exact answer for at least `LEAST_SHARE` of its samples after the
-    start: before that, the disks of a pile have met nothing."""
-    truth, intervals = comparison.truth, comparison.scenario.intervals
-    return truth is not None and len(truth) - 1 >= max(1.0, LEAST_SHARE * intervals)
+def values_by(rows: pd.DataFrame) -> dict[tuple[str, float, str], float]:
+    names = rows.engine + ":" + rows.profile
+    return dict(zip(zip(names, rows.dt_s.astype(float), rows.metric), rows.value.astype(float)))
 
 
 def scenes_of(comparisons: Iterable[Comparison]) -> list[SceneScores]:
-    """The scenes of a run, with their situations."""
     return [SceneScores(each, situations_of(each.scenario, each.truth)) for each in comparisons]
 
 
 def smooth(scenes: Sequence[SceneScores]) -> list[SceneScores]:
-    """Those without friction that are scored."""
     return [scene for scene in scenes if scene.counts and FRICTION not in scene.situations]
 
 
@@ -248,20 +211,4 @@ def label(name: str) -> str:
 
 
 def long_label(name: str) -> str:
-    """The same with the profile of a library."""
     return f"{label(name)}, {name.rpartition(':')[2]}" if is_library(name) else label(name)
-
-
-def nearer_profile(scenes: Sequence[SceneScores], profiles: Sequence[str]) -> tuple[str, int, int]:
-    """Of two profiles the one that is nearer by more than a factor `TIE` in more scenes, the last
-    if in as many; and in how many it is nearer and farther than the first."""
-    if len(profiles) < 2:
-        return profiles[0], 0, 0
-    pairs = np.array([[max(scene.error(name), EXACT) for name in profiles[:2]] for scene in scenes])
-    both = np.isfinite(pairs).any(axis=1)
-    with np.errstate(invalid="ignore"):
-        ratio = pairs[both, 1] / pairs[both, 0]
-    nearer, farther = int((ratio < 1 / TIE).sum()), int((ratio > TIE).sum())
-    if nearer >= farther:
-        return profiles[1], nearer, farther
-    return profiles[0], farther, nearer

@@ -27,6 +27,16 @@ MOST_TABS = 16
 MOST_BYTES = 4096  # bytes of a message from a page
 # one per tab, and some for pages; not those of the loop, which waits for its threads
 THREADS = ThreadPoolExecutor(MOST_TABS + 8)
+config_of = partial(
+    uvicorn.Config,
+    log_level="warning",
+    ws="websockets-sansio",
+    ws_max_size=MOST_BYTES,
+    ws_ping_interval=10,
+    ws_ping_timeout=10,
+    timeout_graceful_shutdown=1,
+    lifespan="off",
+)
 
 
 async def in_thread(do: Callable[..., T], *arguments: Any) -> T:
@@ -35,7 +45,6 @@ async def in_thread(do: Callable[..., T], *arguments: Any) -> T:
 
 
 def application(routes: Sequence[BaseRoute]) -> Starlette:
-    """The web application of these routes, for this machine's own names only."""
     hosts = Middleware(TrustedHostMiddleware, allowed_hosts=list(NAMES), www_redirect=False)
     return Starlette(routes=list(routes), middleware=[hosts])
 
@@ -46,20 +55,21 @@ def taken_socket(port: int) -> socket.socket:
     Raises:
         OSError: none of the next few is free, or access is denied.
     """
-    for each in range(port, min(port + PORTS, 65536)):
+    last = min(port + PORTS, 65536) - 1
+    for number in range(port, last + 1):
+        listening = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         try:
-            taken = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-            taken.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            taken.bind((HOST, each))
-            taken.listen(64)
-            return taken
+            listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            listening.bind((HOST, number))
+            listening.listen(64)
+            return listening
         except OSError as fault:
-            taken.close()
+            listening.close()
             if isinstance(fault, PermissionError):
                 raise OSError(
                     "the system keeps it for administrators, as it does ports below 1024"
                 ) from None
-    raise OSError(f"none of the ports {port} to {min(port + PORTS, 65536) - 1} is free")
+    raise OSError(f"none of the ports {port} to {last} is free")
 
 
 def serve(app: Starlette, port: int, path: str, opens: bool) -> None:
@@ -69,10 +79,10 @@ def serve(app: Starlette, port: int, path: str, opens: bool) -> None:
         listening = taken_socket(port)
     except OSError as fault:
         refuse([f"--port {port}: {fault}; name another"])
-    found = listening.getsockname()[1]
-    if found != port:
-        print(f"Port {port} is taken: this is on {found}.", file=sys.stderr)
-    url = f"http://localhost:{found}{path}"
+    bound = listening.getsockname()[1]
+    if bound != port:
+        print(f"Port {port} is taken: this is on {bound}.", file=sys.stderr)
+    url = f"http://localhost:{bound}{path}"
     print(f"{url}  (Ctrl-C stops it)", flush=True)
     if opens and not webbrowser.open(url):
         print(f"--open: no browser was found here; open {url} yourself.", file=sys.stderr)
@@ -91,15 +101,3 @@ def is_unexpected(record: logging.LogRecord) -> bool:
     """Whether a message of the server is about more than work cut off because the server stops."""
     cut_off = record.exc_info and isinstance(record.exc_info[1], CancelledError)
     return not (cut_off or record.getMessage().startswith("Cancel "))
-
-
-config_of = partial(
-    uvicorn.Config,
-    log_level="warning",
-    ws="websockets-sansio",
-    ws_max_size=MOST_BYTES,
-    ws_ping_interval=10,
-    ws_ping_timeout=10,
-    timeout_graceful_shutdown=1,
-    lifespan="off",
-)

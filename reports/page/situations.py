@@ -6,15 +6,8 @@ import numpy as np
 
 from crosscheck2d.scenarios.model import Scenario, Trajectory
 
-FLIGHT, SINGLE, ROWS, STACKS, CROWDS, SPIN, FRICTION = (
-    "Flight",
-    "Single collisions",
-    "Rows",
-    "Stacks and rest",
-    "Crowds",
-    "Spin",
-    "Friction",
-)
+FLIGHT, SINGLE, ROWS, STACKS = "Flight", "Single collisions", "Rows", "Stacks and rest"
+CROWDS, SPIN, FRICTION = "Crowds", "Spin", "Friction"
 SITUATIONS = {
     FLIGHT: "no collisions in the exact answer",
     SINGLE: "at most two disks move, or no disk meets two others",
@@ -37,34 +30,24 @@ def situations_of(scenario: Scenario, truth: Trajectory | None) -> list[str]:
         return [FRICTION]
     moving = int(np.isfinite(scene.mass).sum())
     turns = bool(scene.angular_velocity.any()) or any(t.torque for t in scenario.thrusts)
-    met = None if truth is None else partners(truth)
+    met: dict[int, set[int]] = {}  # disk -> the other disks with which it collides, walls apart
+    pairs = () if truth is None else zip(truth.collisions.i, truth.collisions.j)
+    for i, j in pairs:
+        for disk, partner in ((int(i), int(j)), (int(j), int(i))):
+            if disk >= 0:
+                met.setdefault(disk, set()).update({partner} if partner >= 0 else ())
+    # centres, velocities and gravity: on one line if these vectors have rank 1
+    along = [scene.position - scene.position[0], scene.velocity, scene.gravity[None]]
+    scaled = np.vstack([rows / (np.abs(rows).max() or 1.0) for rows in along])
+    one_line = int(np.linalg.matrix_rank(scaled, tol=1e-9)) <= 1
     if scene.gravity.any() and scene.restitution == 0:
-        found = STACKS
-    elif met == {}:
-        found = FLIGHT
-    elif moving > 1 and scene.n + len(scene.walls) > 2 and on_one_line(scenario):
-        found = ROWS
-    elif moving <= 2 or (met is not None and all(len(others) < 2 for others in met.values())):
-        found = SINGLE
+        kind = STACKS
+    elif truth is not None and not met:
+        kind = FLIGHT
+    elif moving > 1 and scene.n + len(scene.walls) > 2 and one_line:
+        kind = ROWS
+    elif moving <= 2 or (truth is not None and all(len(disks) < 2 for disks in met.values())):
+        kind = SINGLE
     else:
-        found = CROWDS
-    return [found, SPIN] if turns else [found]
-
-
-def partners(truth: Trajectory) -> dict[int, set[int]]:
-    """Disk -> the other disks with which it collides; empty if it meets walls only."""
-    met: dict[int, set[int]] = {}
-    for i, j in zip(truth.collisions.i.tolist(), truth.collisions.j.tolist()):
-        for one, other in ((i, j), (j, i)):
-            if one >= 0:
-                met.setdefault(one, set()).update({other} if other >= 0 else ())
-    return met
-
-
-def on_one_line(scenario: Scenario) -> bool:
-    """Whether all centres lie on one line, with all velocities and gravity along it."""
-    scene = scenario.scene
-    spread = scene.position - scene.position[0]
-    along = [spread, scene.velocity, scene.gravity[None]]
-    rows = np.vstack([each / (np.abs(each).max() or 1.0) for each in along])
-    return int(np.linalg.matrix_rank(rows, tol=1e-9)) <= 1
+        kind = CROWDS
+    return [kind, SPIN] if turns else [kind]

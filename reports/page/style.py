@@ -18,16 +18,11 @@ from crosscheck2d.reports.terminal.foreign_text import encoded
 
 
 class Look(NamedTuple):
-    """How an engine and profile are drawn.
+    """How an engine and profile are drawn: hex colours on a light and on a dark page, lengths of
+    stroke and gap in px (() for a solid line), a key of `PATHS`, and whether that shape is filled.
 
     Without colour the mark (shape, filled or not) distinguishes all of `ENGINES`, and the dash
     distinguishes the profiles of an engine.
-
-    Attributes:
-        light, dark: hex colour on a light and on a dark page.
-        dash: lengths of stroke and gap in px, () for a solid line.
-        shape: a key of `PATHS`.
-        filled: whether the shape is.
     """
 
     light: str
@@ -38,7 +33,6 @@ class Look(NamedTuple):
 
     @property
     def path(self) -> str:
-        """The shape as an SVG path."""
         return PATHS[self.shape]
 
 
@@ -75,6 +69,9 @@ PALETTE = (
 CHANGED = (1, 2)  # a profile with one thing changed, `matched+...`
 
 
+_files: dict[str, Mark] = {}  # of the solvers' files that are drawn beside each other
+
+
 def look(engine: str, profile: str = "") -> Look:
     """How `engine:profile`, or the truth, is drawn."""
     light, dark, shape = OF_TRUTH if engine == TRUTH else mark_of(engine)
@@ -93,7 +90,12 @@ def looks_of(names: Iterable[str]) -> dict[str, Look]:
     return {name: look(*name.split(":", 1)) for name in names}
 
 
-_files: dict[str, Mark] = {}  # of the solvers' files that are drawn beside each other
+def marks_of_rows() -> dict[str, Mark | None]:
+    marks: dict[str, Mark | None] = {}
+    for name, row in {**FETCHED, **ENGINES}.items():
+        if not name.endswith(OWN):
+            marks.setdefault(name.partition(":")[0], row.mark)
+    return marks
 
 
 def mark_of(engine: str) -> Mark:
@@ -102,38 +104,28 @@ def mark_of(engine: str) -> Mark:
     The name of a solver's file selects its mark from `PALETTE`, the same in the game and in every
     report. If a file on the same page already has that mark, it gets the next.
     """
-    marks: dict[str, Mark | None] = {}
-    for name, row in {**FETCHED, **ENGINES}.items():
-        if not name.endswith(OWN):
-            marks.setdefault(name.partition(":")[0], row.mark)
-    if engine not in marks:
+    rows = marks_of_rows()
+    if engine not in rows:
         return _files.get(engine) or _files.setdefault(engine, mark_of_file(engine))
-    return marks[engine] or PALETTE[unmarked().index(engine) % len(PALETTE)]
-
-
-def marks() -> list[Mark]:
-    """Every mark of an engine, of `PALETTE` and of the exact answer, each once."""
-    rows = [row.mark for row in {**FETCHED, **ENGINES}.values() if row.mark]
-    return list(dict.fromkeys([*rows, *PALETTE, OF_TRUTH]))
-
-
-def unmarked() -> list[str]:
-    """The engines without a mark in their row."""
-    rows = {**FETCHED, **ENGINES}.items()
-    engines = [name.partition(":")[0] for name, row in rows if not (row.mark or name.endswith(OWN))]
-    return list(dict.fromkeys(engines))
+    unmarked = [name for name, mark in rows.items() if not mark]
+    return rows[engine] or PALETTE[unmarked.index(engine) % len(PALETTE)]
 
 
 def mark_of_file(path: str) -> Mark:
     """The first free mark, starting with the one that the name of the file selects."""
     first = crc32(encoded(PurePath(path).name)) % len(PALETTE)
     marks = PALETTE[first:] + PALETTE[:first]
-    taken = (*_files.values(), *PALETTE[: len(unmarked())])
+    unmarked = sum(not mark for mark in marks_of_rows().values())
+    taken = (*_files.values(), *PALETTE[:unmarked])
     return next((mark for mark in marks if mark not in taken), marks[0])
 
 
+def marks() -> list[Mark]:
+    rows = [mark for mark in marks_of_rows().values() if mark]
+    return list(dict.fromkeys([*rows, *PALETTE, OF_TRUTH]))
+
+
 def css_variables(dark: bool) -> str:
-    """The colours of engines as CSS custom properties, named by the light one."""
     return "".join(f"--{mark.light[1:]}:{mark[dark]};" for mark in marks())
 
 

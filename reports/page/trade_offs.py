@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +16,7 @@ from crosscheck2d.reports.page import style
 from crosscheck2d.reports.page.drawing import Line, draw_lines, new_figure, svg_of
 from crosscheck2d.reports.page.kit import Chart, Section, Table, TableCell
 from crosscheck2d.reports.page.scenes import OURS, SceneScores, label, smooth
-from crosscheck2d.reports.page.summary import Summary, played, rounded
+from crosscheck2d.reports.page.summary import Summary, rounded, stand_in
 
 SIZES = Path(__file__).parents[1] / "speed" / "figures.csv"
 LIMITS = ("stability_limits.csv", "stability_limits_javascript.csv")
@@ -39,51 +41,52 @@ NEAR = 0.8  # of the best limit: as good
 def error_against_cost(summary: Summary) -> Section | None:
     """The chart of error against cost, at all step sizes; without times against the number of
     steps. None if there is nothing to draw."""
-    scenes = smooth(summary.scenes)
-    others = [name for of in summary.profiles.values() for name in of]
+    if not (scenes := smooth(summary.scenes)):
+        return None
+    others = [name for names in summary.profiles.values() for name in names]
     names = [name for name in summary.columns if name not in OURS[1:] or not summary.libraries]
-    lines = [line(summary, scenes, name) for name in names]
-    lines += [line(summary, scenes, name, faint=True) for name in others if name not in names]
-    lines = [each for each in lines if np.isfinite(np.asarray(each.y, float)).any()]
+    lines = [make_line(summary, scenes, name) for name in names]
+    lines += [make_line(summary, scenes, name, faint=True) for name in others if name not in names]
+    lines = [line for line in lines if np.isfinite(np.asarray(line.y, float)).any()]
     if not lines:
         return None
     figure, axes = new_figure()
     timed = bool(summary.costs)
-    x_title = (
-        "engine time for a second of simulation" if timed else "steps in a second of simulation"
-    )
+    x_title = f"{'engine time for' if timed else 'steps in'} a second of simulation"
     draw_lines(axes, lines, x_title, "error, radii", x_unit="µs" if timed else "")
-    thin = " Thin: the other settings." if any(each.faint for each in lines) else ""
+    thin = " Thin: the other settings." if any(line.faint for line in lines) else ""
     says = f"Medians of {len(scenes)} scenes, at all step sizes; filled: the usual one.{thin}"
     if not timed:
         says += f" {summary.clock.fault}"
     return Section("Error against cost", says, [Chart(svg_of(figure, says))], css="pair", id="cost")
 
 
-def line(summary: Summary, scenes: Sequence[SceneScores], name: str, faint: bool = False) -> Line:
+def make_line(
+    summary: Summary, scenes: Sequence[SceneScores], name: str, faint: bool = False
+) -> Line:
     """(cost, error) at each step size: the geometric mean of the timed scenes, the median of all
     scenes; a scene with fewer step sizes is left out where it has none."""
-    points: list[tuple[float, float]] = []
-    middle: list[int] = []
-    for k in range(max((len(scene.comparison.scenario.substeps) for scene in scenes), default=0)):
-        costs: list[float] = []
-        errors: list[float] = []
-        for scene in scenes:
-            scenario = scene.comparison.scenario
-            if k < len(scenario.substeps):
-                dt = scenario.dt(scenario.substeps[k])
-                errors.append(scene.error(played(name, scene), dt))
-                key = (scene.name, played(name, scene), rounded(dt))
-                costs.append(summary.times.get(key, np.nan) if summary.costs else 1 / dt)
-                middle += [k] * (dt == scene.comparison.middle_dt)
-        costs = [cost for cost in costs if not np.isnan(cost)]
-        errors = [error for error in errors if not np.isnan(error)]
-        if costs and errors:
-            points.append((float(np.exp(np.mean(np.log(costs)))), float(np.median(errors))))
+    costs: dict[int, list[float]] = {}  # number of the step size -> of each scene
+    errors: dict[int, list[float]] = {}
+    usual = Counter[int]()
+    for scene in scenes:
+        engine, scenario = stand_in(name, scene), scene.comparison.scenario
+        for k, dt in enumerate(map(scenario.dt, scenario.substeps)):
+            key = (scene.name, engine, rounded(dt))
+            costs.setdefault(k, []).append(
+                summary.times.get(key, np.nan) if summary.costs else 1 / dt
+            )
+            errors.setdefault(k, []).append(scene.error(engine, dt))
+            usual[k] += dt == scene.comparison.middle_dt
+    points = []
+    for k in sorted(costs):
+        cost, error = (np.array(values)[~np.isnan(values)] for values in (costs[k], errors[k]))
+        if len(cost) and len(error):
+            points.append((np.exp(np.mean(np.log(cost))), np.median(error) or np.nan))
     x, y = zip(*points) if points else ((), ())
-    filled = max(set(middle), key=middle.count) if middle and not faint else -1
-    text = "" if faint else label(name)
-    return Line(name, x, [error if error > 0 else np.nan for error in y], text, filled, faint)
+    # of several numbers that are usual in as many scenes the smallest
+    filled = -1 if faint else max(sorted(usual), key=usual.__getitem__)
+    return Line(name, x, y, "" if faint else label(name), filled, faint)
 
 
 def cost_against_size(summary: Summary) -> Section | None:
@@ -106,7 +109,7 @@ def cost_against_size(summary: Summary) -> Section | None:
         "A gas that covers 30 % of a box, by crosscheck speed on another machine. The reference"
         " tests every pair, the others only neighbours."
     )
-    drawn = {each.name for each in lines}
+    drawn = {line.name for line in lines}
     if missing := [label(name) for name in summary.libraries if name not in drawn]:
         says += f" Not measured: {', '.join(missing)}."
     chart = Chart(svg_of(figure, f"Time of a step against the number of disks. {says}"))
@@ -114,8 +117,9 @@ def cost_against_size(summary: Summary) -> Section | None:
 
 
 def limits(summary: Summary) -> Section | None:
-    """Where each method fails, from the limits that the repository keeps; None without them."""
-    files = [path for name in LIMITS if (path := kept_file(name))]
+    # an installation has no tests
+    folders = [parent / "tests" / "data" for parent in Path(__file__).parents]
+    files = [folder / name for name in LIMITS for folder in folders if (folder / name).is_file()]
     if not files or not summary.libraries:
         return None
     kept = pd.concat([pd.read_csv(path) for path in files])
@@ -123,8 +127,11 @@ def limits(summary: Summary) -> Section | None:
     names = [name for name in summary.columns if not name.endswith(OWN)]
     rows, index = [], []
     for case, (title, unit, sense) in CASES.items():
-        of_case = kept[kept.case == case].set_index("name")
-        reaches = {name: reach(of_case.loc[name], sense) for name in of_case.index}
+        reaches = {}  # larger is farther: inf does not fail; nan works only beyond a value
+        for row in kept[kept.case == case].to_dict("records"):
+            words = {"does not fail": np.inf, "never works": 0.0}
+            words["limit"] = float(row["works_at"]) ** sense
+            reaches[row["name"]] = words.get(row["verdict"], np.nan)
         rows.append(limit_cells(summary, names, reaches, sense))
         index.append(TableCell(Markup("{} <small>{}</small>").format(title, unit)))
     frame = pd.DataFrame(rows, index, [label(name) for name in names], dtype=object)
@@ -136,49 +143,31 @@ def limits(summary: Summary) -> Section | None:
     return Section("Where each method fails", says, [Table(frame, css="fixed limits")], id="limits")
 
 
-def kept_file(name: str) -> Path | None:
-    """A file of the limits that the repository keeps; None in an installation without them."""
-    places = [parent / "tests" / "data" / name for parent in Path(__file__).parents]
-    return next((path for path in places if path.is_file()), None)
-
-
-def reach(row: pd.Series, sense: int) -> float:
-    """How far an engine goes, larger is farther: inf where it does not fail, 0 where it never
-    works, nan where it works only beyond a value."""
-    reached = {"does not fail": np.inf, "never works": 0.0, "limit": float(row.works_at) ** sense}
-    return reached.get(str(row.verdict), np.nan)
-
-
 def limit_cells(
     summary: Summary, names: Sequence[str], reaches: dict[str, float], sense: int
 ) -> list[TableCell]:
     """The cells of a row; neighbours that say the same are one."""
+
+    def text(value: float) -> str:  # in the unit of the case
+        if np.isnan(value):
+            return "–"
+        limit = style.number(value**sense, 2) if 0 < value < np.inf else ""
+        return limit or ("never" if value == 0 else "holds")
+
     best = max((reaches.get(name, np.nan) for name in summary.libraries), default=np.nan)
     cells: list[TableCell] = []
     for name in names:
-        value, notes = reaches.get(name, np.nan), list[TableCell]()
-        for other in summary.profiles.get(name.partition(":")[0], ()):
-            if other != name and reaches.get(other, np.inf) < NEAR * value:
-                text = f"{other.partition(':')[2]} {reach_text(reaches[other], sense)}"
-                notes.append(TableCell(text, css="soft"))
-        css = (
-            "bad"
-            if value == 0
-            else "best"
-            if value >= NEAR * best and name in summary.libraries
-            else ""
-        )
-        cells.append(TableCell(reach_text(value, sense), css=css, notes=tuple(notes)))
+        value = reaches.get(name, np.nan)
+        notes = [
+            TableCell(f"{other.partition(':')[2]} {text(reaches[other])}", css="soft")
+            for other in summary.profiles.get(name.partition(":")[0], ())
+            if other != name and reaches.get(other, np.inf) < NEAR * value
+        ]
+        near = "best" if value >= NEAR * best and name in summary.libraries else ""
+        cells.append(TableCell(text(value), css="bad" if value == 0 else near, notes=tuple(notes)))
     if len({(cell.text, cell.notes) for cell in cells}) == 1:
-        text = "all hold" if cells[0].text == "holds" else f"all: {cells[0].text}"
-        cells = [TableCell(text, css="soft", span=len(names))] + [TableCell()] * (len(names) - 1)
-    elif len({cell.css for cell, name in zip(cells, names) if name in summary.libraries}) == 1:
-        cells = [TableCell(c.text, css=c.css.replace("best", ""), notes=c.notes) for c in cells]
+        says = "all hold" if cells[0].text == "holds" else f"all: {cells[0].text}"
+        return [TableCell(says, css="soft", span=len(names))] + [TableCell()] * (len(names) - 1)
+    if len({cell.css for cell, name in zip(cells, names) if name in summary.libraries}) == 1:
+        return [replace(cell, css=cell.css.replace("best", "")) for cell in cells]
     return cells
-
-
-def reach_text(value: float, sense: int) -> str:
-    """A limit in the unit of its case."""
-    if np.isnan(value):
-        return "–"
-    return "holds" if np.isinf(value) else "never" if value == 0 else style.number(value**sense, 2)

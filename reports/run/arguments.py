@@ -4,24 +4,15 @@ exit 2."""
 from __future__ import annotations
 
 import difflib
-import os
 from collections.abc import Collection, Iterable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 
-from crosscheck2d.adapters.engines import (
-    ENGINES,
-    FETCHED,
-    OWN,
-    UNASKED,
-    packages,
-    parsed,
-    read_row,
-)
+from crosscheck2d.adapters.engines import ENGINES, FETCHED, OWN, UNASKED, packages, parsed, read_row
 from crosscheck2d.adapters.host.file import HINTS, KINDS, NotASolver
-from crosscheck2d.adapters.library_at_version import LibraryAtVersion
-from crosscheck2d.adapters.npm_packages import ABSENT, NotInstalled, fetch, missing, version_of
+from crosscheck2d.adapters.library_at_version import ABSENT, LibraryAtVersion, NotInstalled
+from crosscheck2d.adapters.npm_packages import fetch, missing, version_of
 from crosscheck2d.reports.run.scenes import open_scene, with_steps
 from crosscheck2d.reports.run.store import Store, reading, writing
 from crosscheck2d.reports.terminal.console import Console
@@ -44,20 +35,19 @@ def opening(out: Path, command: str, fresh: bool = False, there: bool = False) -
                     pass
             store = stack.enter_context(writing(out, command, fresh, option))
         except FolderTaken as fault:
-            refuse([str(fault)])
+            refuse(str(fault))
         except Damaged as fault:
-            refuse([f"{option}{fault}"])
+            refuse(f"{option}{fault}")
         except OSError as fault:
-            refuse([f"{option}{out}: {fault.strerror or fault}; name a folder that can be written"])
+            refuse(f"{option}{out}: {fault.strerror or fault}; name a folder that can be written")
         try:
             yield store
         except (Damaged, Unusable) as fault:
-            refuse([str(fault)])
+            refuse(str(fault))
 
 
 def checked_scenes(scenes: Sequence[str], dts: Sequence[float], full: bool, seed: int) -> list[str]:
-    """The requested scenes without duplicates; exits 2 with every fault of every scene, one line
-    each."""
+    """The scenes without duplicates; exits 2 with every fault of every scene, one line each."""
     scenes = list(dict.fromkeys(scenes))
     faults: list[str] = []
     names: dict[str, str] = {}
@@ -160,8 +150,6 @@ def faults_of_packages(rows: Iterable[str]) -> list[str]:
 
 
 def faults_of_version(library: LibraryAtVersion) -> list[str]:
-    """Fetches another version of a library, if it is not there; returns why it cannot be
-    played."""
     try:
         if not library.recorded:
             with Progress() as progress:
@@ -174,21 +162,7 @@ def faults_of_version(library: LibraryAtVersion) -> list[str]:
     return []
 
 
-@contextmanager
-def started_where(folder: str) -> Iterator[None]:
-    """Context in the folder in which a run was started, to which the paths of solvers' files are
-    relative; nothing changes if it is gone."""
-    before = Path.cwd()
-    with suppress(OSError):
-        os.chdir(folder)
-    try:
-        yield
-    finally:
-        os.chdir(before)
-
-
 def faults_of_file(file: Path) -> list[str]:
-    """Why a file cannot be used as an engine."""
     if ":" in str(file):
         return [f"{file}: has a colon in its path, which separates engine and profile; rename it"]
     try:
@@ -199,7 +173,6 @@ def faults_of_file(file: Path) -> list[str]:
 
 
 def unknown_engine(name: str, known: Collection[str]) -> str:
-    """A sentence that an engine is unknown, or that it has no such versions."""
     names = {*known, *(row.split(":")[0] for row in known)}
     engine, at, _ = name.partition("@")
     if not at or (engine not in names and Path(engine).suffix.lower() not in KINDS):
@@ -214,7 +187,6 @@ def unknown_engine(name: str, known: Collection[str]) -> str:
 
 
 def unknown(kind: str, name: str, known: Iterable[str]) -> str:
-    """A sentence that a name is unknown, with the most similar known names."""
     near = difflib.get_close_matches(name, list(known), n=3, cutoff=0.5)
     hint = f"did you mean {' or '.join(near)}?" if near else "see: crosscheck list"
     return f"{kind} {name!r} is not known; {hint}"

@@ -15,9 +15,8 @@ import pandas as pd
 
 from crosscheck2d.reports.run.cells import versions
 from crosscheck2d.reports.run.results import RunResults
-from crosscheck2d.reports.terminal.console import Console
+from crosscheck2d.reports.terminal.console import Console, print_list, print_table
 from crosscheck2d.reports.terminal.counts import counted, listed
-from crosscheck2d.reports.terminal.tables import print_list, print_table
 from crosscheck2d.scenarios.model import Trajectory
 
 KEPT = Path(__file__).parents[1] / "bits.csv"
@@ -35,6 +34,15 @@ class ChangedBits(NamedTuple):
     name: str
     same: int
     other: int
+
+    @property
+    def sentence(self) -> str:
+        where = f"the same bits up to sample {self.same}, others by sample {self.other}"
+        if self.other < 0:
+            where = "it did not play to the same sample"
+        elif self.same < 0:
+            where = "other bits from the start on"
+        return f"{self.name} in {self.scenario}: {where}"
 
 
 def rows_of(results: RunResults) -> list[dict[str, Any]]:
@@ -72,26 +80,16 @@ def bits_of(played: Trajectory) -> tuple[str, str]:
 
 
 def written(rows: list[dict[str, Any]], about: Mapping[str, str]) -> str:
-    """The table as CSV, below comment lines on the machine and versions that made it."""
     lines = "".join(f"# {key}: {value}\n" for key, value in about.items())
     return lines + pd.DataFrame(rows, columns=COLUMNS).to_csv(index=False)
 
 
 def read(text: str) -> pd.DataFrame:
-    """The table that `written` made, with every cell as text."""
     lines = [line for line in text.splitlines() if not line.startswith("#")]
     return pd.read_csv(io.StringIO("\n".join(lines)), dtype=str, keep_default_na=False)
 
 
-def about_of(text: str) -> dict[str, str]:
-    """The comment lines of `written`."""
-    lines = [line[2:].split(": ", 1) for line in text.splitlines() if line.startswith("# ")]
-    return {key: value for key, value in lines}
-
-
 def differences(kept: pd.DataFrame, now: pd.DataFrame) -> tuple[list[ChangedBits], pd.DataFrame]:
-    """The rows of both tables whose bits differ; and all rows that both have, with the suffixes
-    _kept and _now."""
     both = kept.merge(now, on=COLUMNS[:4], suffixes=("_kept", "_now"))
     changed = [
         ChangedBits(
@@ -117,18 +115,21 @@ def first_other(one: str, other: str) -> tuple[int, int]:
 
 
 def write_bits(results: RunResults) -> None:
-    """Write the table of a run to its folder, below the system, architecture and versions, which
-    may affect the bits."""
     system = {"system": platform.system(), "architecture": platform.machine()}
     made_by = {**system, "Python": platform.python_version(), **versions()}
     results.store.export(BITS, written(rows_of(results), made_by))
 
 
 def kept_bits(folder: Path) -> bool:
-    """Print in how many scenes the bits of a run equal the kept ones, and the first differences;
-    whether all that can be compared do, and there is something to compare."""
+    """Print how the bits of a run differ from the kept ones; whether there are any, and none do."""
     kept, here = (path.read_text(encoding="utf-8") for path in (KEPT, folder / BITS))
-    table, (before, made_by) = read(here), map(about_of, (kept, here))
+    table, (before, made_by) = (
+        read(here),
+        (
+            dict(line[2:].split(": ", 1) for line in text.splitlines() if line.startswith("# "))
+            for text in (kept, here)
+        ),
+    )
     changed, both = differences(read(kept), table)
     counts = Counter((both.engine + ":" + both.profile).tolist())
     other = Counter(row.name for row in changed)
@@ -137,7 +138,7 @@ def kept_bits(folder: Path) -> bool:
     title = "In how many scenes the bits are those kept in reports/bits.csv"
     print_table(console, ["engine", "the same", "of"], rows, title)
     console.print()
-    print_list(console, map(in_words, changed[:SHOWN]))
+    print_list(console, [row.sentence for row in changed[:SHOWN]])
     if len(changed) > SHOWN:
         console.print(f"and {counted(len(changed) - SHOWN, 'more difference')}")
     if new := {*(table.engine + ":" + table.profile)} - {*counts}:
@@ -152,14 +153,3 @@ def kept_bits(folder: Path) -> bool:
         console.print(f"The kept bits were made with {', '.join(others)}.", highlight=False)
     console.print()
     return not changed and not both.empty
-
-
-def in_words(row: ChangedBits) -> str:
-    """A sentence on where the bits differ."""
-    if row.other < 0:
-        where = "it did not play to the same sample"
-    elif row.same < 0:
-        where = "other bits from the start on"
-    else:
-        where = f"the same bits up to sample {row.same}, others by sample {row.other}"
-    return f"{row.name} in {row.scenario}: {where}"

@@ -11,7 +11,6 @@ from collections.abc import Collection, Hashable
 from concurrent.futures import CancelledError, Future
 from math import inf
 from queue import Empty, SimpleQueue
-from types import TracebackType
 from typing import Any
 
 from crosscheck2d.adapters.library_versions import how_to_add
@@ -34,34 +33,26 @@ class Cluster:
         self, scheduler: str, timeout: float, memory: int, alone: Collection[Hashable]
     ) -> None:
         self.client = connect(scheduler)
+        self.executor = self.client.get_executor(pure=False)
         self.limits, self.alone = (timeout, memory), alone
         self.under_way: dict[Future[Any], tuple[Any, bytes]] = {}
         self.done: SimpleQueue[Future[Any]] = SimpleQueue()
 
-    def __enter__(self) -> Cluster:
-        self.executor = self.client.get_executor(pure=False)
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, value: object, trace: TracebackType | None
-    ) -> None:
+    def close(self) -> None:
         self.executor.shutdown(wait=False)  # with dask this cancels the remaining tasks
         self.client.close(timeout=1)
 
     @property
     def busy(self) -> bool:
-        """Whether a task has not ended."""
         return bool(self.under_way)
 
     def begin(self, key: Any, packed: bytes) -> None:
-        """Give a pickled task to the cluster."""
         future = self.executor.submit(in_thread, packed, *self.limits, key in self.alone)
         self.under_way[future] = key, packed
         future.add_done_callback(self.done.put)
 
     def ended(self) -> list[tuple[Any, bytes, Any]]:
-        """Key, pickled task and outcome of the tasks that have ended; raises `NoScheduler` if the
-        cluster has gone."""
+        """Key, pickled task and outcome of the tasks that have ended; raises `NoScheduler`."""
         outcomes: list[tuple[Any, bytes, Any]] = []
         while True:
             try:
@@ -97,8 +88,6 @@ def in_thread(packed: bytes, timeout: float, memory: int, alone: bool) -> bytes 
 
 
 def connect(scheduler: str) -> Any:
-    """A client of a dask scheduler that has workers; raises `NoScheduler` naming what is
-    missing."""
     if not re.fullmatch(r"(tcp|tls)://.+:\d+", scheduler):
         raise NoScheduler(
             f"--scheduler {scheduler}: is no address; one is like tcp://192.168.0.7:8786"

@@ -1,5 +1,5 @@
-"""The exact answer to a scene, and its part of deviations.csv: two tasks of a worker, which start
-when the last cell of the scene has ended. Both results are rows.
+"""The exact answer to a scene, and its part of deviations.csv: two tasks of a worker, the second of
+which starts when the answer and all cells of the scene are there. Both results are rows.
 
 If there is no answer, or none in time, the table says why, and the other scenes go on.
 """
@@ -7,8 +7,8 @@ If there is no answer, or none in time, the table says why, and the other scenes
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -21,10 +21,10 @@ from crosscheck2d.reports.compare.comparison import compare
 from crosscheck2d.reports.compare.table import status_row, table_of
 from crosscheck2d.reports.compare.view import NOT_JUDGED
 from crosscheck2d.reports.run.cells import digest, judge_hash
+from crosscheck2d.reports.run.playing import load_trajectory
 from crosscheck2d.reports.run.pool import Failure, allow
 from crosscheck2d.reports.run.scenes import SceneSource, open_scene
 from crosscheck2d.reports.run.store import Store
-from crosscheck2d.reports.run.trajectories import load_trajectory
 from crosscheck2d.scenarios.model import Scenario
 from crosscheck2d.scenarios.no_truth import NoTruth, answered
 from crosscheck2d.scenarios.truth.cache import packed, unpacked
@@ -41,9 +41,7 @@ PATHS = "surrogateescape"  # keeps the path of a solver whose name is not UTF-8
 # s that the comparison of a scene may take: all 38 of the default run take 30, on two cores
 COMPARING = 300.0
 ANSWER, COMPARED = "truth", "comparison"  # kinds of rows
-Key = tuple[str, str]  # the kind and the key of a task and of its row
-Task = tuple[Key, Callable[[], Any]]
-Record = dict[str, Any]  # the row of a cell, with its key, its scene and the digest of the row
+Record = dict[str, Any]  # the value of a row; of a cell with its key and the digest of its row
 
 
 class ExactAnswer(NamedTuple):
@@ -54,23 +52,16 @@ class ExactAnswer(NamedTuple):
         status: "ok"; "none" if the scene has no exact answer; "timeout", "crashed" or "error" as in
             `Failure`.
         reason: why there is none, or "".
-        timeout_s: the time limit of the computation.
     """
 
     record: TruthRecord | None
     status: str
     reason: str
-    timeout_s: float = 0.0
 
     @property
     def lost(self) -> str:
         """Why the answer to a scene could not be computed, although it may exist; or ""."""
         return "" if self.status in (OK, NONE) else self.reason
-
-    def worth_another_try(self, timeout: float) -> bool:
-        """Whether it failed for a reason other than time, or under a limit shorter than `timeout`
-        s."""
-        return bool(self.lost) and (self.status != "timeout" or self.timeout_s < timeout)
 
     def put_into(self, scenario: Scenario) -> Scenario:
         """The scenario with this as its truth, so that it is not computed again."""
@@ -82,13 +73,12 @@ class ExactAnswer(NamedTuple):
 
 
 def compute_answer(source: SceneSource) -> ExactAnswer:
-    """In a worker: the exact answer to a scene."""
+    """In a worker."""
     scenario, truth = answered(source.scenario())
     if truth is None:
         return ExactAnswer(None, NONE, scenario.without_truth)
-    return ExactAnswer(
-        scenario.truth.record() if isinstance(scenario.truth, OracleTruth) else None, OK, ""
-    )
+    record = scenario.truth.record() if isinstance(scenario.truth, OracleTruth) else None
+    return ExactAnswer(record, OK, "")
 
 
 def no_answer(failure: Failure, timeout: float) -> ExactAnswer:
@@ -96,14 +86,25 @@ def no_answer(failure: Failure, timeout: float) -> ExactAnswer:
     reason = f"the exact answer could not be computed: {failure.status}: {failure.reason}"
     if failure.status == "timeout":
         reason = f"the exact answer took longer than {timeout:g} s (--timeout)"
-    return ExactAnswer(None, failure.status, reason, timeout)
+    return ExactAnswer(None, failure.status, reason)
 
 
-class SceneTable(NamedTuple):
-    """A scene's part of deviations.csv, with the key of its row."""
+def answer_key(source: SceneSource) -> str:
+    return digest(repr((source.digest, judge_hash())).encode())
 
-    key: str
-    csv: bytes
+
+def store_answer(store: Store, key: str, result: ExactAnswer | Failure, timeout: float) -> Record:
+    """Write the row of an answer; one that failed for another reason than time is tried again."""
+    answer = no_answer(result, timeout) if isinstance(result, Failure) else result
+    value = {
+        "status": answer.status,
+        "reason": answer.reason,
+        "timeout_s": timeout if answer.lost else 0.0,
+        "outside": bool(answer.lost) and answer.status != "timeout",
+    }
+    blob = b"" if answer.record is None else packed(vars(answer.record))
+    store.put(ANSWER, key, value, blob)
+    return value
 
 
 @dataclass(frozen=True)
@@ -117,7 +118,6 @@ class CompareTask:
     answer: ExactAnswer
 
     def __call__(self) -> bytes:
-        """The scene table."""
         function, arguments = self.__reduce__()
         return bytes(function(*arguments)())
 
@@ -126,10 +126,24 @@ class CompareTask:
         return partial, (compare_scene, self.source, self.records, files, self.answer)
 
 
+def compare_task(
+    store: Store, source: SceneSource, records: Sequence[Record]
+) -> tuple[str, CompareTask]:
+    """The key of the table of a scene whose answer has a row, and the task that makes it."""
+    row = store.get(ANSWER, answer_key(source))
+    assert row is not None
+    record = TruthRecord(**unpacked(row.blob)) if row.blob else None
+    answer = ExactAnswer(record, row.value["status"], row.value["reason"])
+    cells = [(record["cell"], record["digest"]) for record in records]
+    key = digest(repr((cells, row.digest, judge_hash())).encode())
+    return key, CompareTask(store, source, records, answer)
+
+
 def compare_scene(
     source: SceneSource, records: Sequence[Record], files: Sequence[bytes], answer: ExactAnswer
 ) -> bytes:
-    """In a worker: compare the cells of a scene with its answer and with each other."""
+    """In a worker: compare the cells of a scene with its answer and with each other; the scene's
+    part of deviations.csv."""
     allow(COMPARING)
     runs = [run_of(record, file) for record, file in zip(records, files)]
     comparison = compare(answer.put_into(source.scenario()), runs)
@@ -137,91 +151,6 @@ def compare_scene(
     if answer.lost and not (lost := rows_not_judged(comparison.runs, answer.lost, TRUTH)).empty:
         table = pd.concat([table, lost])
     return csv_of(table)
-
-
-@dataclass
-class SceneTasks:
-    """The two tasks of each scene, which start when all its cells have ended, and their results.
-
-    Attributes:
-        cells: scene -> the keys of its cells, in reading order.
-        sources: scene -> what makes its scenario.
-        records: key -> the row of each cell that has ended.
-        timeout: s that an exact answer may take; one that was stopped at a shorter limit is
-            computed again.
-        answers, tables: scene -> its exact answer; its table.
-        failed: scene -> why it could not be compared.
-    """
-
-    store: Store
-    cells: Mapping[str, Sequence[str]]
-    sources: Mapping[str, SceneSource]
-    records: dict[str, Record]
-    timeout: float
-    answers: dict[str, ExactAnswer] = field(default_factory=dict)
-    tables: dict[str, SceneTable] = field(default_factory=dict)
-    failed: dict[str, Failure] = field(default_factory=dict)
-    scenes: dict[Key, str] = field(default_factory=dict)  # of the tasks that were started
-    under_way: set[Key] = field(default_factory=set)
-
-    def tasks(self, partly: bool = False) -> Iterator[Task]:
-        """The next task of every scene whose cells have all ended; `partly`: of which any has."""
-        for scene in self.cells:
-            yield from self.next_task(scene, partly)
-
-    def next_task(self, scene: str, partly: bool = False) -> Iterator[Task]:
-        """When all cells of a scene have ended: first its answer, then its table, each once."""
-        records = [self.records[key] for key in self.cells[scene] if key in self.records]
-        if not records or (len(records) < len(self.cells[scene]) and not partly):
-            return
-        source = self.sources[scene]
-        task = ANSWER, digest(repr((source.digest, judge_hash())).encode())
-        answer, row = None, self.store.get(*task)
-        if row is not None:
-            record = TruthRecord(**unpacked(row.blob)) if row.blob else None
-            answer = ExactAnswer(record, *row.value)
-        if task not in self.scenes and (answer is None or answer.worth_another_try(self.timeout)):
-            yield self.started(task, scene), partial(compute_answer, source)
-            return
-        if answer is None or row is None:
-            return
-        self.answers[scene] = answer
-        cells = [(record["cell"], record["digest"]) for record in records]
-        task = COMPARED, digest(repr((cells, row.digest, judge_hash())).encode())
-        if row := self.store.get(*task):
-            self.tables[scene] = SceneTable(task[1], row.blob)
-        elif task not in self.scenes:
-            yield self.started(task, scene), CompareTask(self.store, source, records, answer)
-
-    def started(self, task: Key, scene: str) -> Key:
-        """Remember what a task is of."""
-        self.scenes[task] = scene
-        self.under_way.add(task)
-        return task
-
-    @property
-    def awaited(self) -> list[str]:
-        """The scenes whose exact answer is being computed, or is about to be."""
-        return [
-            self.scenes[task]
-            for task in self.scenes
-            if task in self.under_way and task[0] == ANSWER
-        ]
-
-    def task_ended(self, task: Key, result: Any, partly: bool = False) -> Iterator[Task]:
-        """Write the result of a task, and return the next task of its scene."""
-        scene = self.scenes[task]
-        self.under_way.discard(task)
-        if task[0] == ANSWER:
-            answer = no_answer(result, self.timeout) if isinstance(result, Failure) else result
-            record = b"" if answer.record is None else packed(vars(answer.record))
-            self.store.put(*task, answer[1:], record)
-            yield from self.next_task(scene, partly)
-        elif isinstance(result, Failure):
-            self.failed[scene] = result
-        else:
-            self.store.put(*task, None, result)
-            self.tables[scene] = SceneTable(task[1], result)
 
 
 def file_of(store: Store, record: Record) -> bytes:
@@ -243,12 +172,11 @@ def run_of(record: Record, file: bytes) -> Run:
         seconds=record["seconds"],
         settings={name: tuple(pair) for name, pair in record["settings"].items()},
         versions=record["versions"],
-        frictionless=record.get("frictionless", False),  # a run of before has none
+        frictionless=record["frictionless"],
     )
 
 
 def csv_of(table: pd.DataFrame) -> bytes:
-    """A table as the text that `read_scene_table` reads."""
     return table.to_csv(index=False).encode(errors=PATHS)
 
 

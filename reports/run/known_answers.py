@@ -35,7 +35,6 @@ class KnownAnswer:
     source: str = "leggedrobotics/SimBenchmark, data/bouncing/sample.csv"
 
     def reproduce(self) -> float:
-        """J2, computed here."""
         if self.made_by in SIX_LINES:
             return six_lines(self.dt_s, SIX_LINES[self.made_by])
         return mean_squared_error_of(self.made_by, self.dt_s)

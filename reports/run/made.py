@@ -29,7 +29,6 @@ def sealed(text: str) -> str:
 
 
 def is_sealed(data: bytes) -> bool:
-    """Whether a file has the bytes that `sealed` gave."""
     text, seal, _ = data.rpartition(b"<!-- as it was written: ")
     return bool(seal) and data == encoded(sealed(text.decode(errors="replace")))
 

@@ -34,7 +34,6 @@ from crosscheck2d.adapters.safe_path import OwnPackages, keep_path_safe
 from crosscheck2d.reports.terminal.exits import refuse, say
 
 TIMEOUT = 60.0  # s a task may take
-LONGEST = 1e6  # s, of a task that only ends with the run
 STARTING = 120.0  # s for a process to start and to import the modules of a task, on a busy machine
 IDLE = 60.0  # s without a task after which a process ends: those of other machines outlive a run
 ATTEMPTS = 2  # of a task whose worker is killed from outside
@@ -81,8 +80,7 @@ _parent: Connection | None = None
 
 
 def leave(parts: Sequence[Any]) -> None:
-    """Append bytes to the trail of this task, which survives the process. Does nothing outside a
-    worker."""
+    """Append bytes to the trail of this task, which survives the process."""
     if _trail is not None:
         with suppress(OSError):  # if the trail cannot be written, the engine is not at fault
             os.write(_trail, b"".join(parts))
@@ -125,8 +123,7 @@ def serve(connection: Connection, folder: str, memory: int, fresh: bool) -> None
 
 
 def carried_out(packed: bytes, memory: int) -> tuple[bytes, bool]:
-    """The pickled result of a task, or its pickled `Failure`; and whether the process is still
-    usable."""
+    """The pickled result of a task, or `Failure`; and whether the process is still usable."""
     doing = "the worker cannot read its task: "
     try:
         task = pickle.loads(packed)
@@ -145,8 +142,6 @@ def carried_out(packed: bytes, memory: int) -> tuple[bytes, bool]:
 
 
 def out_of_memory(memory: int) -> Failure:
-    """The failure of a task that took more than `memory` bytes, or with 0 more than the machine
-    has."""
     limit = f"more than {memory / 1e6:.0f} MB (--memory)" if memory else "more than there is"
     return Failure("error", f"MemoryError: took {limit}", outside=True)
 
@@ -155,7 +150,6 @@ def out_of_memory(memory: int) -> Failure:
 
 
 def start_process(connection: Connection, folder: str, memory: int) -> Any:
-    """Start a worker at the other end of a connection."""
     fresh = CONTEXT.get_start_method() == "spawn"
     if fresh:  # finds nothing in the folder in which the command was started
         os.environ["PYTHONSAFEPATH"] = "1"
@@ -165,12 +159,12 @@ def start_process(connection: Connection, folder: str, memory: int) -> Any:
 
 
 class Worker:
-    """A process, its pipe, and a folder with its output and the trail of its task."""
+    """A process, its pipe, and a folder with its output and the trail of its task; `memory` in
+    bytes, 0: no limit. Raises `OSError` if it cannot be started."""
 
     def __init__(self, memory: int) -> None:
-        """Start the process; `memory` in bytes, 0: no limit. Raises `OSError`."""
-        self.memory, self.limit, self.begun = memory, STARTING, False
-        self.key: Any = None  # of its task
+        self.memory = memory
+        self.task: tuple[Any, bytes] | None = None  # its key, and its pickle
         self.folder = Path(tempfile.mkdtemp(prefix="crosscheck-"))
         self.output, self.trail = self.folder / "output", self.folder / "trail"
         for path in (self.output, self.trail):
@@ -185,15 +179,10 @@ class Worker:
         finally:
             theirs.close()
 
-    @property
-    def idle(self) -> bool:
-        """Whether it can take a task."""
-        return self.key is None and self.process.exitcode is None
-
     def begin(self, key: Any, packed: bytes, timeout: float) -> None:
         """Give it a pickled task, whose `timeout` counts from its arrival, and again from each call
         of `allow`."""
-        self.key, self.timeout, self.limit, self.begun = key, timeout, STARTING, False
+        self.task, self.timeout, self.limit, self.begun = (key, packed), timeout, STARTING, False
         self.end = monotonic() + STARTING
         for path in (self.output, self.trail):
             os.truncate(path, 0)
@@ -214,13 +203,17 @@ class Worker:
         if self.process.exitcode is not None:
             return self.death()
         if monotonic() > self.end:
-            return self.late()
+            if os.name == "posix":
+                os.kill(self.process.pid, signal.SIGABRT)  # faulthandler works even inside C code
+                self.process.join(1.0)
+            self.kill()
+            what = "stopped after" if self.begun else "its worker did not start in"
+            return self.failure("timeout", f"{what} {self.limit:g} s")
         if self.output.stat().st_size > MOST_PRINTED:
             os.truncate(self.output, 0)
         return RUNNING
 
     def death(self) -> Any:
-        """How it died."""
         self.process.join()
         code = self.process.exitcode
         if code in OUTSIDE:
@@ -229,32 +222,22 @@ class Worker:
             return out_of_memory(self.memory)
         what = "worker died" if self.begun else "its worker could not start"
         how = signal.Signals(-code).name if code < 0 else f"exit status {code}"
-        reason = f"{what}: {how}{self.place()}"
-        return Failure("crashed", reason, self.trail.read_bytes(), outside=not self.begun)
+        return self.failure("crashed", f"{what}: {how}")
 
-    def late(self) -> Failure:
-        """Kill it, because its time is over; with the place in Python where it hung."""
-        if os.name == "posix":
-            os.kill(self.process.pid, signal.SIGABRT)  # faulthandler works even inside C code
-            self.process.join(1.0)
-        self.kill()
-        what = "stopped after" if self.begun else "its worker did not start in"
-        reason = f"{what} {self.limit:g} s{self.place()}"
-        return Failure("timeout", reason, self.trail.read_bytes(), outside=not self.begun)
-
-    def place(self) -> str:
-        """The place in Python that faulthandler printed, and the last line of output before it, as
-        the end of a sentence."""
+    def failure(self, status: str, reason: str) -> Failure:
+        """With the place in Python that faulthandler printed, and the last line printed before."""
         printed = self.output.read_bytes()[-PRINTED:].decode(errors="replace")
         before, fatal, dump = printed.rpartition("Fatal Python error: ")
-        innermost = INNERMOST.search(dump)
-        file = "/".join(Path(innermost[1]).parts[-2:]) if innermost else ""
-        place = f" in {innermost[3]}, line {innermost[2]} of {file}" if innermost else ""
-        # a solver's file runs in another process, so the place in the file is not known here
-        if file in ASKING:
-            place = ", while the solver's file had not come back from a call"
+        if innermost := INNERMOST.search(dump):
+            file = "/".join(Path(innermost[1]).parts[-2:])
+            # a solver's file runs in another process, so the place in the file is not known here
+            if file in ASKING:
+                reason += ", while the solver's file had not come back from a call"
+            else:
+                reason += f" in {innermost[3]}, line {innermost[2]} of {file}"
         lines = [line for line in (before if fatal else printed).splitlines() if line.strip()]
-        return place + (f'; it had printed "{lines[-1].strip()[:200]}"' if lines else "")
+        reason += f'; it had printed "{lines[-1].strip()[:200]}"' if lines else ""
+        return Failure(status, reason, self.trail.read_bytes(), outside=not self.begun)
 
     def kill(self) -> None:
         """End the process, and what it has started."""
@@ -264,7 +247,6 @@ class Worker:
         self.process.join()
 
     def close(self) -> None:
-        """End the process and delete its folder."""
         self.kill()
         self.connection.close()
         shutil.rmtree(self.folder, ignore_errors=True)
@@ -282,33 +264,27 @@ class Pool:
 
     @property
     def busy(self) -> list[Worker]:
-        """The workers that have a task."""
-        return [worker for worker in self.workers if worker.key is not None]
+        return [worker for worker in self.workers if worker.task is not None]
 
     @property
     def has_room(self) -> bool:
-        """Whether it can begin a task."""
         return len(self.busy) < self.most
 
     def begin(self, key: Any, packed: bytes) -> None:
         """Give a pickled task to a worker."""
-        for worker in [one for one in self.workers if one.key is None]:
-            if key in self.alone or not worker.idle or worker.memory != self.memory:
+        for worker in [worker for worker in self.workers if worker.task is None]:
+            ended = worker.process.exitcode is not None
+            if ended or key in self.alone or worker.memory != self.memory:
                 self.close(worker)
-        worker = next((one for one in self.workers if one.key is None), None) or self.start()
-        worker.begin((key, packed), packed, self.timeout)
-
-    def start(self) -> Worker:
-        """One more worker."""
-        try:
-            worker = Worker(self.memory)
-        except OSError as fault:
-            refuse([f"no more processes can be started: {fault.strerror or fault}"])
-        self.workers.append(worker)
-        return worker
+        if all(worker.task is not None for worker in self.workers):
+            try:
+                self.workers.append(Worker(self.memory))
+            except OSError as fault:
+                refuse(f"no more processes can be started: {fault.strerror or fault}")
+        idle = next(worker for worker in self.workers if worker.task is None)
+        idle.begin(key, packed, self.timeout)
 
     def close(self, worker: Worker) -> None:
-        """End a worker."""
         worker.close()
         self.workers.remove(worker)
 
@@ -321,17 +297,17 @@ class Pool:
         outcomes = []
         for worker in self.busy:
             outcome = worker.poll()
-            if outcome is not RUNNING:
-                outcomes.append((*worker.key, outcome))
-                worker.key = None
-                if not isinstance(outcome, bytes) or outcomes[-1][0] in self.alone:
+            if outcome is not RUNNING and worker.task is not None:
+                key, packed = worker.task
+                outcomes.append((key, packed, outcome))
+                worker.task = None
+                if not isinstance(outcome, bytes) or key in self.alone:
                     self.close(worker)
         return outcomes
 
     def close_all(self) -> None:
-        """End all workers."""
         for worker in self.workers:
-            worker.process.kill()
+            worker.process.kill()  # all at once, before each is waited for
         for worker in [*self.workers]:
             self.close(worker)
 
@@ -357,44 +333,42 @@ def run_all(
     waiting: deque[tuple[Any, Any]] = deque(tasks.items())
     lost = Counter[Hashable]()
     urgent = deque() if urgent is None else urgent
-    refused: deque[tuple[Any, Failure]] = deque()
     pool = Pool(affordable(workers), timeout, memory, alone)
+    done: list[tuple[Any, Any]] = []
+
+    def begin() -> None:
+        while True:
+            place: Any
+            if urgent and pool.has_room:
+                place, (key, task) = pool, urgent.popleft()
+            elif waiting and (far or pool).has_room:
+                place, (key, task) = far or pool, waiting.popleft()
+            else:
+                return
+            try:
+                packed = task if isinstance(task, bytes) else pickle.dumps(task)
+            except Exception as error:
+                reason = f"it cannot be sent to a worker: {type(error).__name__}: {error}"
+                done.append((key, Failure("error", reason, outside=True)))
+            else:
+                place.begin(key, packed)
+
     with ExitStack() as stack:
         stack.callback(pool.close_all)
-
-        def begin() -> None:
-            while True:
-                place: Any
-                if urgent and pool.has_room:
-                    place, (key, task) = pool, urgent.popleft()
-                elif waiting and (far or pool).has_room:
-                    place, (key, task) = far or pool, waiting.popleft()
-                else:
-                    return
-                try:
-                    packed = task if isinstance(task, bytes) else pickle.dumps(task)
-                except Exception as error:
-                    reason = f"it cannot be sent to a worker: {type(error).__name__}: {error}"
-                    refused.append((key, Failure("error", reason, outside=True)))
-                else:
-                    place.begin(key, packed)
-
-        while True:
-            begin()
-            if not (pool.busy or refused or (far is not None and far.busy)):
-                return
-            outcomes = pool.ended(0.0 if refused else 0.05 if far else math.inf)
+        begin()
+        while done or pool.busy or (far is not None and far.busy):
+            outcomes = pool.ended(0.0 if done else 0.05 if far else math.inf)
             outcomes += far.ended() if far is not None else []
-            done = [*refused]
-            refused.clear()
             for key, packed, outcome in outcomes:
                 lost[key] += outcome is LOST
                 if outcome is LOST and lost[key] < ATTEMPTS:
                     waiting.append((key, packed))
                 else:
                     done.append((key, result_of(outcome)))
+            ended, done[:] = [*done], []
             begin()  # before the caller takes its time
-            yield from done
+            yield from ended
+            begin()  # what the caller has made urgent
 
 
 def result_of(outcome: Any) -> Any | Failure:
@@ -412,7 +386,7 @@ def affordable(workers: int) -> int:
     files = system.most_files()
     if files < OTHERS + LINES:
         refuse(
-            [f"at most {files} files may be open, and a run needs {OTHERS + LINES}: ulimit -n 1024"]
+            f"at most {files} files may be open, and a run needs {OTHERS + LINES}: ulimit -n 1024"
         )
     most = {
         f"memory of {memory} MB, each needs {LEAST_MEMORY}": max(1, memory // LEAST_MEMORY),

@@ -21,9 +21,9 @@ from pathlib import Path
 from typing import Any
 
 from crosscheck2d.reports.run.comparing import COMPARED, file_of, run_of
+from crosscheck2d.reports.run.playing import load_trajectory
 from crosscheck2d.reports.run.scenes import SceneSource
 from crosscheck2d.reports.run.store import FILE, Store
-from crosscheck2d.reports.run.trajectories import load_trajectory
 from crosscheck2d.reports.terminal.exits import Unusable
 from crosscheck2d.scenarios.model import Trajectory
 
@@ -57,7 +57,6 @@ class RunResults:
 
     @staticmethod
     def read(store: Store) -> RunResults:
-        """Read the rows of a folder; raises `Unusable` if there is no plan."""
         row = store.get("run", "plan")
         if row is None:
             raise Unusable(f"{store.folder / FILE}: has no plan, so nothing was played")
@@ -87,25 +86,10 @@ class RunResults:
 
     @property
     def folder(self) -> Path:
-        """Where the run is."""
         return self.store.folder
-
-    @property
-    def seconds(self) -> float:
-        """Duration of the run that made the rows; NaN if it is not complete."""
-        return float(self.header["seconds"]) if self.complete else float("nan")
-
-    @cached_property
-    def cells(self) -> dict[str, list[str]]:
-        """Scene -> the keys of its cells."""
-        cells: dict[str, list[str]] = {}
-        for key, scene in self.header["tasks"]["cell"]:
-            cells.setdefault(scene, []).append(key)
-        return cells
 
     @cached_property
     def by_scene(self) -> dict[str, list[dict[str, Any]]]:
-        """Scene -> the records of its cells."""
         by_scene: dict[str, list[dict[str, Any]]] = {}
         for record in self.records:
             by_scene.setdefault(record["scene"], []).append(record)
@@ -113,8 +97,10 @@ class RunResults:
 
     @cached_property
     def sources(self) -> dict[str, SceneSource]:
-        """Scene -> what makes its scenario again."""
-        return sources_of(self.header)
+        return {
+            scene: SceneSource(**source | {"substeps": tuple(source["substeps"])})
+            for scene, source in self.header["sources"].items()
+        }
 
     @cached_property
     def timings(self) -> dict[str, dict[int, dict[str, Any]]]:
@@ -135,12 +121,10 @@ class RunResults:
         }
 
     def trajectory(self, record: Mapping[str, Any]) -> Trajectory | None:
-        """The trajectory of a cell; None if it has none."""
         file = file_of(self.store, dict(record))
         return load_trajectory(file) if file else None
 
     def run(self, record: Mapping[str, Any], with_trajectory: bool = True) -> Any:
-        """The run of a cell."""
         return run_of(dict(record), file_of(self.store, dict(record)) if with_trajectory else b"")
 
     def tables(self) -> Sequence[bytes]:
@@ -153,11 +137,3 @@ class RunResults:
                 f"{self.folder}: has no complete tables; make them: crosscheck report {self.folder}"
             )
         return [row.blob for row in rows if row is not None]
-
-
-def sources_of(header: Mapping[str, Any]) -> dict[str, SceneSource]:
-    """Scene -> what makes its scenario again, from a plan."""
-    return {
-        scene: SceneSource(**source | {"substeps": tuple(source["substeps"])})
-        for scene, source in header["sources"].items()
-    }

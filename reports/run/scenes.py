@@ -37,7 +37,6 @@ class SceneSource(NamedTuple):
     digest: str
 
     def scenario(self) -> Scenario:
-        """The scenario."""
         if self.text:
             scenario = scenario_of(tomllib.loads(self.text), f"{self.name}.toml")
         else:

@@ -10,15 +10,14 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Collection, Iterator
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 from crosscheck2d.adapters.system import BINARY, lock
-from crosscheck2d.reports.terminal.exits import FolderTaken
-from crosscheck2d.reports.terminal.exits import say as warn
-from crosscheck2d.reports.terminal.foreign_text import encoded, whole
+from crosscheck2d.reports.terminal.exits import FolderTaken, say
+from crosscheck2d.reports.terminal.foreign_text import encoded, put_whole
 from crosscheck2d.scenarios.regular import all_of
 from crosscheck2d.scenarios.rows import Row, Rows, digest_of
 
@@ -62,12 +61,12 @@ class Store:
         if self.fresh and (kind, key) not in self.written:
             return None
 
-        def name(sentence: str) -> None:
+        def warn(sentence: str) -> None:
             if (kind, key) not in self.warned:
-                warn(sentence)
+                say(sentence)
             self.warned.add((kind, key))
 
-        return self.rows.get(kind, key, name)
+        return self.rows.get(kind, key, warn)
 
     def export(self, name: str, data: str | bytes) -> None:
         """Write a file of the folder, whole or not at all.
@@ -86,8 +85,7 @@ class Store:
             return
         self.rows.put(EXPORT, name, [*before, digest])
         path.parent.mkdir(exist_ok=True)
-        with whole(path) as file:
-            file.write(data)
+        put_whole(path, data)
 
     @contextmanager
     def exporting(self, name: str) -> Iterator[Path]:
@@ -107,8 +105,9 @@ class Store:
         except OSError:
             return False
 
-    def delete_exports(self, folder: str, used: Mapping[str, Any]) -> None:
-        """Delete the exports in a folder below this one that are not `used`."""
+    def delete_exports(self, folder: str, used: Collection[str]) -> None:
+        """Delete the exports in a folder below this one that are not `used`, but those that were
+        changed since."""
         names = [name for name in self.rows.keys(EXPORT) if name.startswith(f"{folder}/")]
         unused = [name for name in names if name not in used]
         for name in unused:
@@ -124,16 +123,19 @@ class Store:
         """Raise `FolderTaken` if the folder holds anything but the rows and their exports."""
         exports = set(self.rows.keys(EXPORT))
         folders = {name.partition("/")[0] for name in exports if "/" in name}
-        for path in files_below(self.folder, folders):
+        paths: list[Path] = []
+        for path in sorted(self.folder.iterdir()):
+            below = path.name in folders and path.is_dir() and not path.is_symlink()
+            paths += sorted(path.iterdir()) if below else [path]
+        for path in paths:
             name = path.relative_to(self.folder).as_posix()
             if OWN.fullmatch(path.name):
                 if path.suffix == ".part":  # of a command that was killed
                     path.unlink()
             elif name not in exports or not self.is_ours(name):
+                why = changed(path) if name in exports else "crosscheck did not make"
                 raise FolderTaken(
-                    f"{option}{self.folder}: holds {name}, which"
-                    f" {changed(path) if name in exports else 'crosscheck did not make'};"
-                    f" {MOVE_OR_NAME}"
+                    f"{option}{self.folder}: holds {name}, which {why}; {MOVE_OR_NAME}"
                 )
 
 
@@ -142,13 +144,11 @@ def changed(path: Path) -> str:
     return "is a link" if path.is_symlink() else "is not as crosscheck left it"
 
 
-def files_below(folder: Path, folders: set[str]) -> Iterator[Path]:
-    """All entries of a folder but `folders`, and all entries of those; links are not followed."""
-    for path in sorted(folder.iterdir()):
-        if path.name in folders and path.is_dir() and not path.is_symlink():
-            yield from sorted(path.iterdir())
-        else:
-            yield path
+def is_usable(row: Row, timeout: float) -> bool:
+    """Whether a task with this row need not be done again: unless it was stopped at a shorter time
+    limit than `timeout` s, or failed for a reason outside the engine."""
+    late = row.value.get("status") == "timeout" and row.value["timeout_s"] < timeout
+    return not (late or row.value.get("outside"))
 
 
 @contextmanager
@@ -163,60 +163,38 @@ def writing(
         OSError: it cannot be made, written or locked.
     """
     folder = place_of(out, option)
-    new, unlocked = not folder.exists(), not (folder / LOCK).exists()
+    if folder.exists() and not (folder / FILE).exists():
+        names = sorted(path.name for path in folder.iterdir())
+        if inside := [name for name in names if not OWN.fullmatch(name)]:
+            what = f"holds {inside[0]}, which crosscheck did not make; {MOVE_OR_NAME}"
+            raise FolderTaken(f"{option}{folder}: {OF_OLD_FORMAT if OLD in inside else what}")
     folder.mkdir(parents=True, exist_ok=True)
-    with locked(folder, option):
-        try:
-            inside = sorted(path.name for path in folder.iterdir() if not OWN.fullmatch(path.name))
-            if inside and not (folder / FILE).exists():
-                what = f"holds {inside[0]}, which crosscheck did not make; {MOVE_OR_NAME}"
-                what = OF_OLD_FORMAT if OLD in inside else what
-                raise FolderTaken(f"{option}{folder}: {what}")
-            rows = Rows(folder / FILE)
-        except BaseException:
-            with suppress(OSError):
-                if unlocked:
-                    (folder / LOCK).unlink()
-                if new:
-                    folder.rmdir()
-            raise
-        try:
-            store = Store(folder, rows, fresh)
-            made_by = rows.get("folder", "command")
-            if made_by is not None and made_by.value != command:
-                raise FolderTaken(
-                    f"{option}{out}: was made by {made_by.value}, not by {command}; name another"
-                    " folder"
-                )
-            if made_by is None:
-                rows.put("folder", "command", command)
-            store.refuse_foreign(option)
-            yield store
-        finally:
-            rows.close()
+    with locked(folder, option), closing(Rows(folder / FILE)) as rows:
+        made_by = rows.get("folder", "command")
+        if made_by is None:
+            rows.put("folder", "command", command)
+        elif made_by.value != command:
+            raise FolderTaken(
+                f"{option}{out}: was made by {made_by.value}, not by {command}; name another folder"
+            )
+        store = Store(folder, rows, fresh)
+        store.refuse_foreign(option)
+        yield store
 
 
 @contextmanager
 def reading(folder: Path, command: str) -> Iterator[Store]:
     """Context in which the rows of `command` in a folder are read, while another process may write;
     raises as `writing`."""
+    missing = f"{folder}: has no {FILE} of {command}, so it is not the folder of one"
     if not (folder / FILE).is_file():
-        raise FolderTaken(without_store(folder, command))
-    rows = Rows(folder / FILE, writing=False)
-    try:
+        old = (folder / OLD).exists()
+        raise FolderTaken(f"{folder}: {OF_OLD_FORMAT}" if old else missing)
+    with closing(Rows(folder / FILE, writing=False)) as rows:
         made_by = rows.get("folder", "command")
         if made_by is None or made_by.value != command:
-            raise FolderTaken(without_store(folder, command))
+            raise FolderTaken(missing)
         yield Store(folder, rows)
-    finally:
-        rows.close()
-
-
-def without_store(folder: Path, command: str) -> str:
-    """Why a folder cannot be read."""
-    if (folder / OLD).exists():
-        return f"{folder}: {OF_OLD_FORMAT}"
-    return f"{folder}: has no {FILE} of {command}, so it is not the folder of one"
 
 
 def place_of(out: Path, option: str = "--out ") -> Path:

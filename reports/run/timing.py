@@ -64,7 +64,6 @@ class Noise(NamedTuple):
 
 
 def noise_of(ratios: Sequence[float] | Array) -> Noise:
-    """The noise of a measurement from the ratios of an engine's cost to that of its copy."""
     if not len(ratios):
         return Noise(0, *[np.nan] * 5)
     low, median, high, least, most = np.percentile(ratios, [25, 50, 75, 0, 100]).tolist()
@@ -114,7 +113,6 @@ def interleaved(
 
 
 def sampled(one: Timed, k: int, place: int) -> Sample:
-    """One sample: as many runs as fill `LEAST` s."""
     seconds, wrapping, runs = 0.0, 0.0, 0
     while runs == 0 or (seconds < LEAST and runs < MOST_RUNS):
         spent = one.run()

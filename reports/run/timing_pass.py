@@ -18,14 +18,7 @@ from crosscheck2d.adapters.engine_row import EngineRow
 from crosscheck2d.reports.run.cells import Cell
 from crosscheck2d.reports.run.pool import allow
 from crosscheck2d.reports.run.results import RunResults
-from crosscheck2d.reports.run.stepping import (
-    CALL,
-    EMPTY,
-    READ,
-    binding_of,
-    overheads,
-    step_through,
-)
+from crosscheck2d.reports.run.stepping import CALL, EMPTY, READ, binding_of, overheads, step_through
 from crosscheck2d.reports.run.timing import WARM_UP, Noise, Sample, Timed, interleaved, noise_of
 from crosscheck2d.scenarios.model import Scenario
 
@@ -83,11 +76,6 @@ class CellToTime(NamedTuple):
     seconds: float  # s that it took as played
 
     @property
-    def is_slow(self) -> bool:
-        """Whether its part took longer than `SLOW` as played."""
-        return self.seconds * self.part.duration / self.scenario.duration > SLOW
-
-    @property
     def part(self) -> Scenario:
         """The scenario, or the first part of it with `WORK` disk steps."""
         scenario = self.scenario
@@ -119,7 +107,6 @@ def cells_to_time(results: RunResults, engines: Mapping[str, EngineRow]) -> list
 
 
 def timed_scenes(played: Sequence[str]) -> list[str]:
-    """The played scenes of `SCENES`, then others in order, up to the number of `SCENES`."""
     known = [scene for scene in SCENES if scene in played]
     return [*known, *(scene for scene in played if scene not in SCENES)][: len(SCENES)]
 
@@ -137,7 +124,7 @@ def time_cells(cells: Sequence[CellToTime], seconds: float, seed: int) -> list[d
     what, slow = [], []
     for cell in cells:
         part = cell.part
-        if cell.is_slow:
+        if cell.seconds * part.duration / cell.scenario.duration > SLOW:
             cost, until = [cell.seconds / cell.scenario.duration], cell.scenario.duration
             slow.append(line_of(("timing", cell.key, 0, until), cost, [0.0]))
             continue
@@ -160,7 +147,6 @@ def time_cells(cells: Sequence[CellToTime], seconds: float, seed: int) -> list[d
 
 
 def line_of(key: tuple[Any, ...], cost: list[float], wrapping: list[float]) -> dict[str, Any]:
-    """The line for the costs of one key."""
     if key[0] == "timing":
         _, cell, copy, until = key
         return {"timing": cell, "copy": copy, "timed_s": until, "cost": cost, "wrapping": wrapping}
@@ -180,7 +166,6 @@ def overheads_of(cells: Sequence[CellToTime]) -> list[Timed]:
 
 
 def can(timed: Timed) -> bool:
-    """Whether it runs; an engine may refuse a world in which nothing moves."""
     with suppress(Exception):
         timed.run()
         return True
@@ -188,12 +173,10 @@ def can(timed: Timed) -> bool:
 
 
 def is_busy(results: RunResults) -> bool:
-    """Whether other work kept the machine so busy that times are not shown."""
     return noise_floor(results).floor > BUSY
 
 
 def timings(results: RunResults) -> pd.DataFrame:
-    """timings.csv with `COLUMNS`: a row for each timed cell."""
     rows: list[tuple[Any, ...]] = []
     scenarios: dict[str, Scenario] = {}
     for record in results.records:
@@ -231,11 +214,9 @@ def binding(results: RunResults, name: str, scenario: Scenario, substeps: int) -
 
 
 def median_of(costs: Sequence[float] | None) -> float:
-    """The median; nan if there are no costs."""
     return float(np.median(costs)) if costs else np.nan
 
 
 def noise_floor(results: RunResults) -> Noise:
-    """The ratios of the two timings of a cell, over all cells timed twice."""
     pairs = [lines for lines in results.timings.values() if {0, 1} <= lines.keys()]
     return noise_of([median_of(pair[1]["cost"]) / median_of(pair[0]["cost"]) for pair in pairs])

@@ -24,7 +24,7 @@ from crosscheck2d.reports.compare.pareto import kept_from
 from crosscheck2d.reports.compare.verdicts import first_failed
 from crosscheck2d.reports.compare.view import View, beside, cut
 from crosscheck2d.reports.page.style import number
-from crosscheck2d.reports.run.machine import busy_cores
+from crosscheck2d.reports.run.cells import busy_cores
 from crosscheck2d.reports.run.playing import LOADING, clocked
 from crosscheck2d.reports.run.pool import Failure, allow
 from crosscheck2d.reports.run.scenes import open_scene

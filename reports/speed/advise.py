@@ -29,10 +29,9 @@ from crosscheck2d.reports.speed.advice import (
     reach,
 )
 from crosscheck2d.reports.speed.ladder import PURPOSES, STARTS
-from crosscheck2d.reports.terminal.console import Console
+from crosscheck2d.reports.terminal.console import Console, print_table, print_texts
 from crosscheck2d.reports.terminal.exits import DONE, FAILED, refuse, say
 from crosscheck2d.reports.terminal.progress import Progress
-from crosscheck2d.reports.terminal.tables import print_table, print_texts
 
 SHOWN = 3  # ranks: the cheapest and the next two
 LIBRARIES, OWN_SOLVERS = "libraries", "solvers of this project"

@@ -14,7 +14,7 @@ from crosscheck2d.adapters.engines import ENGINES, OWN, row_of
 from crosscheck2d.reports.compare.pareto import ACCURACIES, said_of_cheaper
 from crosscheck2d.reports.compare.pooling import WHO, said_of_pool
 from crosscheck2d.reports.run.arguments import checked_engines, checked_scenes, opening
-from crosscheck2d.reports.run.machine import about
+from crosscheck2d.reports.run.cells import about
 from crosscheck2d.reports.run.made import digest_of
 from crosscheck2d.reports.run.store import Store
 from crosscheck2d.reports.speed import figures
@@ -23,10 +23,9 @@ from crosscheck2d.reports.speed.measure import Kept, Measuring
 from crosscheck2d.reports.speed.page import NEVER, NOT_REACHED, cost_of, write_page
 from crosscheck2d.reports.speed.plan import FULL, QUICK, SpeedPlan
 from crosscheck2d.reports.speed.results import Results
-from crosscheck2d.reports.terminal.console import Console
+from crosscheck2d.reports.terminal.console import Console, print_list, print_table, print_texts
 from crosscheck2d.reports.terminal.exits import DONE, FAILED, keeping, say
 from crosscheck2d.reports.terminal.progress import Progress
-from crosscheck2d.reports.terminal.tables import print_list, print_table, print_texts
 
 MACHINE, FIGURES, PAGE = "machine.json", "speed_figures.csv", "speed.html"
 SPEED = "crosscheck speed"

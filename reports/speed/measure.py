@@ -18,8 +18,7 @@ import pandas as pd
 
 from crosscheck2d.adapters.engines import row_of
 from crosscheck2d.adapters.mechanisms.table import MECHANISMS
-from crosscheck2d.reports.run.cells import digest, source_hash
-from crosscheck2d.reports.run.machine import busy_cores
+from crosscheck2d.reports.run.cells import busy_cores, digest, source_hash
 from crosscheck2d.reports.run.pool import Failure, run_all
 from crosscheck2d.reports.run.scenes import open_scene
 from crosscheck2d.reports.run.store import Store

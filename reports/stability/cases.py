@@ -1,13 +1,358 @@
-"""All cases by name, and the headings they stand under, in reading order."""
+"""All cases by name, and the headings they stand under, in reading order. Here are those of whole
+scenes: the largest usable dt of every scenario of the suite, and one quantity of a user's scene
+file that is varied."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache, partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from crosscheck2d.reports.compare import laws
+from crosscheck2d.reports.compare.collisions import match, on_faces, pair_keys, thrown_off, who
+from crosscheck2d.reports.compare.verdicts import MOST_LOST, MOST_OVERLAP, Verdict, verdicts
+from crosscheck2d.reports.compare.view import cut
+from crosscheck2d.reports.page.style import number
 from crosscheck2d.reports.stability.cases_few import ALONE, COLLISIONS
 from crosscheck2d.reports.stability.cases_friction import FRICTION
-from crosscheck2d.reports.stability.cases_gas import GAS
-from crosscheck2d.reports.stability.cases_stacks import STACKS
-from crosscheck2d.reports.stability.limits import Case
-from crosscheck2d.reports.stability.vary import SUITE
+from crosscheck2d.reports.stability.cases_many import GAS, STACKS
+from crosscheck2d.reports.stability.limits import WITH_FRICTION_ONLY, Case
+from crosscheck2d.reports.stability.predicates import Predicate, largest, read, worst_of
+from crosscheck2d.scenarios.catalogue import RANDOM, SCENARIOS, scenario
+from crosscheck2d.scenarios.files.scene_file import read_scene_file
+from crosscheck2d.scenarios.model import (
+    Array,
+    Collisions,
+    Scenario,
+    Scene,
+    Thrust,
+    Trajectory,
+    frozen,
+)
+from crosscheck2d.scenarios.no_truth import answered
+from crosscheck2d.scenarios.truth.exact import with_oracle
+
+GHOST = "ghost collision"
+LEAST_WAY = 0.01  # radii between two samples; smaller distances are rounding
+STEADY = 1e-9  # of a velocity; a smaller change between two samples is the rounding of the answer
+MOST_SAMPLES = 300  # samples at most
+LONG = 2e4  # steps of a disk
+SEEDS = 4  # runs at a value of a random scene
+
+
+def usable(scenario: Scenario, played: Trajectory) -> Verdict:
+    parts = [
+        overlaps(scenario, played),
+        slowed(scenario, played),
+        wrong_collisions(scenario, played),
+        thrown(scenario, played),
+    ]
+    for verdict in verdicts(scenario, played, scenario.dt(scenario.substeps[0])):
+        if verdict.id in ("tunnelled", "energy_gained"):
+            value = verdict.value / verdict.bound if verdict.bound else 2 * verdict.value
+            disk = verdict.disks[0] if verdict.disks else None
+            parts.append(read(value, verdict.at, verdict.text, disk, verdict.id))
+    # for a single free disk nothing is checked
+    return worst_of([part for part in parts if part] or [read(0.0, np.nan, "")])
+
+
+def overlaps(scenario: Scenario, played: Trajectory) -> Verdict | None:
+    """Any overlap in any sample: a verdict allows for the approach in a step, but here the step is
+    what is too large."""
+    if scenario.scene.n + len(scenario.scene.walls) < 2:
+        return None
+    overlap = laws.penetration(played, scenario.scene)
+    event = f"an overlap of {overlap.max():.3g} radii"
+    return largest(played.t, overlap, MOST_OVERLAP, event, None, "penetration")
+
+
+def slowed(scenario: Scenario, played: Trajectory) -> Verdict | None:
+    """The largest part of its distance that a disk loses in a sample interval of free flight: its
+    position has too few digits, or the engine caps its speed.
+
+    The distance is that of the exact answer, as long as the disk has met nothing but walls, as
+    often as there: its speed must be the same. It is also that of the engine's own velocity, before
+    the first collision of a disk: two collisions between two samples may restore its velocity.
+    """
+    scene = scenario.scene
+    if len(played) < 2 or scene.wrap is not None:
+        return None
+    expected = np.maximum(own_distance(scenario, played), exact_distance(scenario, played))
+    expected /= scene.radius
+    moved = laws.lengths(np.diff(played.position, axis=0)) / scene.radius
+    lost = np.where(expected > LEAST_WAY, 1 - moved / np.where(expected > 0, expected, 1.0), 0.0)
+    k, disk = np.unravel_index(int(lost.argmax()), lost.shape)
+    event = f"disk {disk} moves by {max(1 - float(lost[k, disk]), 0.0):.3g} of its distance"
+    return read(lost.max() / MOST_LOST, played.t[k + 1], event, int(disk), "wrong distance")
+
+
+def own_distance(scenario: Scenario, played: Trajectory) -> Array:
+    """(samples - 1, n) m, how far each disk moves between two samples by its own velocity, where
+    that stays the same and the disk has not yet collided; else 0."""
+    scene, v = scenario.scene, played.velocity
+    steady = (v[1:] == v[:-1]).all(axis=2) & ~collided(played, scene, played.t[1:]).any(axis=2)
+    distance = laws.lengths(v[1:]) * scenario.sample_interval
+    return np.where(steady & ~scene.static, distance, 0.0)
+
+
+def exact_distance(scenario: Scenario, played: Trajectory) -> Array:
+    """(samples - 1, n) m, how far each disk moves between two samples of the exact answer, where it
+    flies freely there and in the run, and has met the same walls as often, and no disk; else 0."""
+    distance = np.zeros((len(played) - 1, scenario.scene.n))
+    _, true = answered(scenario)
+    if true is None or len(true) < 2:
+        return distance
+    t, v = true.t, true.velocity
+    met, expected = (collided(run, scenario.scene, t) for run in (played, true))
+    alike = (met == expected).all(axis=2) & (expected[:, :, 0] == 0)
+    free = (np.diff(expected, axis=0) == 0).all(axis=2)
+    change = laws.lengths(np.diff(v, axis=0))
+    steady = change <= STEADY * laws.lengths(v[1:])
+    where = alike[1:] & alike[:-1] & free & steady
+    distance[: len(t) - 1] = np.where(where, laws.lengths(np.diff(true.position, axis=0)), 0.0)
+    return distance
+
+
+def collided(played: Trajectory, scene: Scene, t: Array) -> Array:
+    """(times, n, 1 + walls): how often each disk has met other disks, and each wall, up to and
+    including the times `t` (s)."""
+    counts = np.zeros((len(t) + 1, scene.n, 1 + len(scene.walls)))
+    hits = on_faces(played, scene)
+    when = np.searchsorted(t, hits.t)
+    for disk, other in ((hits.i, hits.j), (hits.j, hits.i)):
+        of_disk = disk >= 0
+        np.add.at(counts, (when[of_disk], disk[of_disk], np.maximum(-other[of_disk], 0)), 1)
+    return counts.cumsum(axis=0)[:-1]
+
+
+def wrong_collisions(scenario: Scenario, played: Trajectory) -> Verdict | None:
+    scenario, true = answered(scenario)
+    if true is None:
+        return None
+    k = min(len(played), len(true))
+    played, true = cut(played, k), cut(true, k)
+    actual, exact = (on_faces(run, scenario.scene) for run in (played, true))
+    end, dt = float(true.t[-1]), scenario.dt(scenario.substeps[0])
+    matched = match(actual, exact, end, dt)
+    wrong = matched.first_wrong or never_collision(actual, exact, end - 3 * dt)
+    if wrong is None:
+        return None
+    at, what = wrong
+    kind, pair = what.split(maxsplit=1)
+    count = len(matched.missed) + len(matched.spurious)
+    disk = int(pair.split("-")[0])
+    return read(2.0 * max(count, 1), at, f"{kind} collision: {pair}", disk, "collisions")
+
+
+def thrown(scenario: Scenario, played: Trajectory) -> Verdict | None:
+    """A ghost collision: the disk hits the end of the next wall of a floor."""
+    scenario, true = answered(scenario)
+    if true is None:
+        return None
+    value, at, disk, wall = thrown_off(played, true, scenario.scene)
+    event = f"disk {disk} is thrown off the surface of wall {wall}, where two of its walls meet"
+    return read(value, at, event, disk, GHOST)
+
+
+def never_collision(played: Collisions, true: Collisions, end: float) -> tuple[float, str] | None:
+    """The first true collision up to `end` s of a pair that never collides in the run. `match`
+    leaves out such a collision near the start."""
+    hard = (true.impulse > 0) & (true.t < end)
+    missed = np.flatnonzero(hard & ~np.isin(pair_keys(true), pair_keys(played)))
+    if not len(missed):
+        return None
+    first = missed[0]
+    return float(true.t[first]), f"missed {who(true.i[first], true.j[first])}"
+
+
+USABLE = Predicate(
+    "unusable",
+    "a number is not finite, a disk goes through a wall or a disk, energy grows by 5 %, disks"
+    " overlap by a tenth of a radius, a disk in free flight moves by half its distance only (its"
+    " speed is capped, or its position has too few digits), or a collision is wrong",
+    "of the bound",
+    1.0,
+    usable,
+)
+
+
+def in_steps(whole: Scenario, dt: float) -> Scenario:
+    """The scenario with a step as near to `dt` s as its duration allows, sampled at most
+    `MOST_SAMPLES` times."""
+    steps = max(1, round(whole.duration / dt))
+    every = -(-steps // MOST_SAMPLES)
+    samples = -(-steps // every)
+    return replace(whole, sample_interval=whole.duration / samples, substeps=(every,))
+
+
+def ladder(whole: Scenario, an_octave: int = 1) -> tuple[float, ...]:
+    """Step sizes in s, a fixed number for each factor of two, from an eighth of the sample
+    interval to a tenth of the duration."""
+    steps = [whole.sample_interval * 2.0 ** (k / an_octave - 3) for k in range(23 * an_octave)]
+    return tuple(dt for dt in steps if dt <= whole.duration / 10)
+
+
+def dense_ladder(whole: Scenario) -> tuple[float, ...]:
+    """As `ladder`, and from the sample interval on four for each factor of two (two where a run is
+    long).
+
+    In a scene without random numbers each dt puts the collisions at other places within their
+    steps: failures appear at scattered step sizes, and only a dense scan finds the first. Finer
+    steps seldom fail and cost most. Both forms scan the same step sizes.
+    """
+    steps = whole.duration / whole.sample_interval * 8
+    close = ladder(whole, 2 if whole.scene.n * steps > LONG else 4)
+    return tuple(sorted({*ladder(whole), *(dt for dt in close if dt > whole.sample_interval)}))
+
+
+def suite_case(name: str, whole: Scenario) -> Case:
+    return Case(
+        f"dt_{name}",
+        whole.asks,
+        lambda x, run: in_steps(scenario(name, run), x),
+        "dt",
+        dense_ladder(whole),
+        USABLE,
+        unit="s",
+        runs=SEEDS if name in RANDOM else 1,
+        ratio=1.2,
+        refines=False,
+        report=name,
+    )
+
+
+def with_scene(whole: Scenario, **fields: Any) -> Scenario:
+    return with_oracle(replace(whole, scene=replace(whole.scene, **fields)))
+
+
+def at_speed(whole: Scenario, x: float) -> Scenario:
+    velocity, spin = whole.scene.velocity * x, whole.scene.angular_velocity * x
+    return with_scene(whole, velocity=velocity, angular_velocity=spin)
+
+
+def at_mass_ratio(whole: Scenario, x: float) -> Scenario:
+    scene, disk = whole.scene, heaviest(whole.scene)
+    factor = np.where(np.arange(scene.n) == disk, x, 1.0)
+    thrusts = [scaled_thrust(t, x, x) if t.disk == disk else t for t in whole.thrusts]
+    heavier = replace(whole, thrusts=thrusts)
+    return with_scene(heavier, mass=scene.mass * factor, inertia=scene.inertia * factor)
+
+
+def heaviest(scene: Scene) -> int:
+    """The heaviest disk that moves; of several the smallest, then the first by x and y, so that the
+    order of the disks does not matter."""
+    keys = (*scene.position.T[::-1], scene.radius, -scene.mass, scene.static)
+    return int(np.lexsort(keys)[0])
+
+
+def similar(whole: Scenario, size: float = 1.0, shift: float = 0.0) -> Scenario:
+    """The same motion, `size` times as large, and moved by `shift` m to the right.
+
+    The exact answer is computed from that of the scene itself. It is exact except for the last
+    digit of the scene's numbers; the oracle does not accept scenes whose scale is far from 1.
+    """
+    scene, truth, by = whole.scene, whole.truth, np.array([shift, 0.0])
+    changed: Scene = replace(
+        scene,
+        position=scene.position * size + by,
+        velocity=scene.velocity * size,
+        radius=scene.radius * size,
+        inertia=scene.inertia * size**2,
+        walls=scene.walls * size + by,
+        gravity=scene.gravity * size,
+        wrap=None if scene.wrap is None else scene.wrap * size + by,
+    )
+
+    def answer(t: Array) -> Trajectory:
+        assert truth is not None
+        was = truth(t)
+        return replace(
+            was,
+            position=was.position * size + by,
+            velocity=was.velocity * size,
+            error_bound=was.error_bound * size,
+            collisions=replace(was.collisions, impulse=frozen(was.collisions.impulse * size)),
+        )
+
+    thrusts = [scaled_thrust(t, size, size**2) for t in whole.thrusts]
+    return replace(whole, scene=changed, thrusts=thrusts, truth=None if truth is None else answer)
+
+
+def scaled_thrust(thrust: Thrust, force: float, torque: float) -> Thrust:
+    return replace(thrust, force=thrust.force * force, torque=thrust.torque * torque)
+
+
+FACTORS = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1e3)
+
+
+class Varied(NamedTuple):
+    parameter: str
+    unit: str
+    values: tuple[float, ...]
+    change: Callable[[Scenario, float], Scenario]
+
+
+# what `--vary` takes
+VARIES = {
+    "dt": Varied("dt", "s", (), in_steps),
+    "speed": Varied(
+        "start velocities and spins / the file's",
+        "1",
+        (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, *FACTORS),
+        at_speed,
+    ),
+    "mass_ratio": Varied(
+        "mass of the heaviest disk, times and divided by",
+        "1",
+        (*FACTORS, 1e4, 1e5, 1e6),
+        at_mass_ratio,
+    ),
+    "restitution": Varied(
+        "restitution",
+        "1",
+        (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 1.0),
+        lambda whole, x: with_scene(whole, restitution=x),
+    ),
+    "scale": Varied(
+        "all lengths / the file's",
+        "1",
+        (1e-3, 2e-3, 5e-3, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, *FACTORS),
+        lambda whole, x: similar(whole, size=x),
+    ),
+    "offset": Varied(
+        "displacement of the whole scene to the right",
+        "m",
+        (*FACTORS, 1e4, 1e5, 1e6),
+        lambda whole, x: similar(whole, shift=x),
+    ),
+}
+
+
+def varied(path: str, what: str, x: float, run: int) -> Scenario:
+    """The scene of a file at the middle step of its ladder, with one quantity varied; in run 1 the
+    other way: divided by x."""
+    whole = read_scene_file(Path(path))
+    if what == "dt":
+        return in_steps(whole, x)
+    changed = VARIES[what].change(whole, 1 / x if run else x)
+    return replace(changed, substeps=(whole.middle_substeps,))
+
+
+def cannot_vary(whole: Scenario, what: str) -> str | None:
+    """Why this cannot be varied in a scene, as the end of a sentence; None if it can."""
+    if what == "mass_ratio" and whole.scene.static.all():
+        return "no disk moves, so that none can be made heavier"
+    if what == "dt" and not ladder(whole):
+        return (
+            "it lasts less than ten steps of an eighth of its sample_interval, the finest that"
+            " would be tried"
+        )
+    return None
+
 
 FAMILIES = {
     "One collision": COLLISIONS,
@@ -15,8 +360,36 @@ FAMILIES = {
     "Friction": FRICTION,
     "Stacks, piles and overlaps": STACKS,
     "A gas at e = 1": GAS,
-    "The largest dt of the suite's scenes": SUITE,
+    "The largest dt of the suite's scenes": tuple(
+        suite_case(name, whole)
+        for name, whole in ((name, build()) for name, build in SCENARIOS.items())
+        if not whole.scene.friction  # the kept limits are of the scenes without
+    ),
 }
-"""Heading -> its cases."""
 CASES: dict[str, Case] = {case.name: case for cases in FAMILIES.values() for case in cases}
 FAMILY_OF = {case.name: family for family, cases in FAMILIES.items() for case in cases}
+
+
+@cache
+def case_named(name: str) -> Case:
+    """A case of the table, or of a scene file, FILE.toml:vary: up to which value is it usable?"""
+    if name in CASES:
+        return CASES[name]
+    path, what = name.rsplit(":", 1)
+    whole, row = read_scene_file(Path(path)), VARIES[what]
+    parameter = row.parameter
+    if what == "mass_ratio":
+        parameter = parameter.replace("the heaviest disk", f"disk {heaviest(whole.scene)}")
+    if what != "dt":
+        parameter += f", at dt = {number(whole.dt(whole.middle_substeps))} s"
+    return Case(
+        name,
+        f"{whole.name}: {whole.asks}",
+        partial(varied, path, what),
+        parameter,
+        row.values or dense_ladder(whole),
+        USABLE,
+        row.unit,
+        runs=2 if what == "mass_ratio" else 1,
+        also=WITH_FRICTION_ONLY if whole.scene.friction else (),
+    )

@@ -12,15 +12,9 @@ from math import ceil, hypot
 
 import numpy as np
 
-from crosscheck2d.reports.stability.limits import Case
-from crosscheck2d.reports.stability.predicates import (
-    CREEPS,
-    FRICTION_OFF,
-    ROLLING_OFF,
-    SLIPS,
-)
-from crosscheck2d.reports.stability.scenes import (
+from crosscheck2d.reports.stability.cases_few import (
     AFTER,
+    DT,
     LEAD,
     RADIUS,
     G,
@@ -29,10 +23,13 @@ from crosscheck2d.reports.stability.scenes import (
     scenario_of,
     stepped,
 )
-from crosscheck2d.reports.stability.scenes import (
-    DT as REST_DT,
+from crosscheck2d.reports.stability.limits import WITH_FRICTION_ONLY, Case
+from crosscheck2d.reports.stability.predicates import (
+    CREEPS,
+    FRICTION_OFF,
+    ROLLING_OFF,
+    SLIPS,
 )
-from crosscheck2d.reports.stability.variants import WITH_FRICTION_ONLY
 from crosscheck2d.scenarios.families.friction import start_of, turning_answer
 from crosscheck2d.scenarios.model import Array, Scenario, Trajectory
 from crosscheck2d.scenarios.truth.closed_forms import at_rest
@@ -42,7 +39,7 @@ SOLID = 2.0  # m r2 / I
 FALL = 4.0  # m/s, four times the threshold of restitution of both Box2Ds as shipped
 # A step displacement of 0.05 radii: an engine that takes its lever arm to the middle of the overlap
 # is off by half of that at most.
-DT = 0.05 * RADIUS / FALL
+BOUNCE_DT = 0.05 * RADIUS / FALL
 PHASES = 8  # runs at a value, each with the collision elsewhere in its step
 FLOOR = [[[-200.0, 0.0], [200.0, 0.0]]]
 
@@ -50,8 +47,7 @@ FLOOR = [[[-200.0, 0.0], [200.0, 0.0]]]
 def rough_bounce(
     along: float, run: int, *, spin: float = 0.0, e: float = 0.0, mu: float = 0.1
 ) -> Scenario:
-    """A disk falls onto a floor at `FALL`, along it at `along` m/s, with a spin in rad/s."""
-    height = FALL * DT * (LEAD + phase(run))
+    height = FALL * BOUNCE_DT * (LEAD + phase(run))
     scene = disks(
         [[0.0, RADIUS + height]],
         [[along, -FALL]],
@@ -67,15 +63,11 @@ def rough_bounce(
         collision = (float(legs.start[1]), 0, -1, (1 + e) * FALL)
         return turning_answer(scene, t, legs.at(t), [collision])
 
-    return stepped(scene, DT, truth)
+    return stepped(scene, BOUNCE_DT, truth)
 
 
 def spinning_into(x: float, run: int) -> Scenario:
-    """How unequal may two masses be that exchange spin?
-
-    A spinning disk of mass 1 meets one of mass x that rests: they stick, e = 0.5, friction 1.
-    """
-    start = -2 * RADIUS - FALL * DT * (LEAD + phase(run))
+    start = -2 * RADIUS - FALL * BOUNCE_DT * (LEAD + phase(run))
     scene = disks(
         [[start, 0.0], [0.0, 0.0]],
         [[FALL, 0.0], [0.0, 0.0]],
@@ -90,7 +82,7 @@ def spinning_into(x: float, run: int) -> Scenario:
         collision = (float(legs.start[1]), 0, 1, float(impulse[0]))
         return turning_answer(scene, t, legs.at(t), [collision])
 
-    return stepped(scene, DT, truth)
+    return stepped(scene, BOUNCE_DT, truth)
 
 
 def on_floor(speed: float, friction: float, slope: float, steps: int) -> Scenario:
@@ -103,7 +95,7 @@ def on_floor(speed: float, friction: float, slope: float, steps: int) -> Scenari
     scene = disks(
         [[0.0, RADIUS]],
         [[speed, 0.0]],
-        walls=[[[-10.0, 0.0], [10.0 + speed * steps * REST_DT, 0.0]]],
+        walls=[[[-10.0, 0.0], [10.0 + speed * steps * DT, 0.0]]],
         gravity=[G * sine, -G * cosine],
         e=0.0,
         friction=friction,
@@ -116,79 +108,86 @@ def on_floor(speed: float, friction: float, slope: float, steps: int) -> Scenari
         place[..., :2] += scene.position
         return turning_answer(scene, t, (place, moves), [(0.0, 0, -1, 0.0)])
 
-    return scenario_of(scene, steps * REST_DT, REST_DT, truth=truth)
-
-
-def cone(x: float, run: int) -> Scenario:
-    """Up to which e does friction in a bounce follow Coulomb's law?
-
-    Friction 0.1, so that the rim slips during the whole collision.
-    """
-    return rough_bounce(5.0, run, e=x)
-
-
-def strong(x: float, run: int) -> Scenario:
-    """How large may friction be where the rim sticks in a bounce?
-
-    e = 0.5.
-    """
-    return rough_bounce(3.0, run, e=0.5, mu=x)
-
-
-def whirling(x: float, run: int) -> Scenario:
-    """How fast may a disk spin that falls onto a floor with friction?
-
-    x = w dt, e = 0, friction 0.5.
-    """
-    return rough_bounce(0.0, run, spin=x / DT, mu=0.5)
+    return scenario_of(scene, steps * DT, DT, truth=truth)
 
 
 def sliding(x: float, run: int) -> Scenario:
-    """How far may a disk slide in a step and still come to roll at 2/3 of its speed?
-
-    Friction 0.5. The runs differ in where within its step the slide ends, by up to one step.
-    """
-    friction, speed = 0.5 * (1 + 0.02 * phase(run)), x * RADIUS / REST_DT
+    # the runs differ in where within its step the slide ends, by up to one step
+    friction, speed = 0.5 * (1 + 0.02 * phase(run)), x * RADIUS / DT
     slides = speed / (3 * friction * G)
-    return on_floor(speed, friction, 0.0, ceil(1.5 * slides / REST_DT) + AFTER)
-
-
-def nearly_slipping(x: float, _run: int) -> Scenario:
-    """How near to the steepest slope for rolling does a disk still roll?
-
-    Up to tan(angle) = 3 mu a solid disk rolls; friction 0.25, 1 s.
-    """
-    return on_floor(0.0, 0.25, 3 * 0.25 * (1 - x), 64)
+    return on_floor(speed, friction, 0.0, ceil(1.5 * slides / DT) + AFTER)
 
 
 def in_corner(x: float, _run: int) -> Scenario:
-    """For how many steps does a disk stay at rest in a corner?
-
-    On a floor and against a wall, friction 0.5: the normal forces alone carry it.
-    """
+    # on a floor and against a wall: the normal forces alone carry the disk
     walls = [[[-1.0, 0.0], [4.0, 0.0]], [[0.0, -1.0], [0.0, 4.0]]]
     scene = disks([[RADIUS, RADIUS]], walls=walls, gravity=[-3.0, -G], e=0.0, friction=0.5)
     every = max(1, int(x) // 100)
-    duration = int(x) // every * every * REST_DT
-    return scenario_of(scene, duration, every * REST_DT, every, lambda t: at_rest(scene, t))
+    duration = int(x) // every * every * DT
+    return scenario_of(scene, duration, every * DT, every, lambda t: at_rest(scene, t))
 
 
-CONES = (0.05, 0.07, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0)
-FRICTIONS = (0.3, 1.0, 3.0, 10.0, 100.0, 1e3, 1e4, 1e6, 1e8)
-TURNS = (0.01, 0.03, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0, 1.4, 2.0, 3.0, 6.0, 10.0)
-RATIOS = (1.0, 10.0, 100.0, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8)
-SLIDES = (0.05, 0.1, 0.2, 0.4, 0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
-SLOPES = (0.9, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 5e-3, 2e-3, 1e-3, 1e-4, 1e-5)
 rough = partial(Case, also=WITH_FRICTION_ONLY)
 FRICTION = (
-    rough("friction_in_bounce", cone, "e", CONES, FRICTION_OFF, runs=PHASES),
-    rough("strong_friction", strong, "friction", FRICTIONS, FRICTION_OFF, runs=PHASES),
-    rough("spin_in_bounce", whirling, "w dt", TURNS, FRICTION_OFF, unit="rad", runs=PHASES),
-    rough("friction_mass_ratio", spinning_into, "m2 / m1", RATIOS, FRICTION_OFF, runs=PHASES),
-    rough("slide_to_roll", sliding, "v dt / R", SLIDES, ROLLING_OFF, runs=4),
-    rough("critical_slope", nearly_slipping, "1 - tan(angle) / 3 mu", SLOPES, SLIPS),
+    rough(
+        "friction_in_bounce",
+        "Up to which e does friction in a bounce follow Coulomb's law?",
+        # the rim slips during the whole collision
+        lambda x, run: rough_bounce(5.0, run, e=x),
+        "e",
+        (0.05, 0.07, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0),
+        FRICTION_OFF,
+        runs=PHASES,
+    ),
+    rough(
+        "strong_friction",
+        "How large may friction be where the rim sticks in a bounce?",
+        lambda x, run: rough_bounce(3.0, run, e=0.5, mu=x),
+        "friction",
+        (0.3, 1.0, 3.0, 10.0, 100.0, 1e3, 1e4, 1e6, 1e8),
+        FRICTION_OFF,
+        runs=PHASES,
+    ),
+    rough(
+        "spin_in_bounce",
+        "How fast may a disk spin that falls onto a floor with friction?",
+        lambda x, run: rough_bounce(0.0, run, spin=x / BOUNCE_DT, mu=0.5),
+        "w dt",
+        (0.01, 0.03, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0, 1.4, 2.0, 3.0, 6.0, 10.0),
+        FRICTION_OFF,
+        unit="rad",
+        runs=PHASES,
+    ),
+    rough(
+        "friction_mass_ratio",
+        "How unequal may two masses be that exchange spin?",
+        spinning_into,
+        "m2 / m1",
+        (1.0, 10.0, 100.0, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8),
+        FRICTION_OFF,
+        runs=PHASES,
+    ),
+    rough(
+        "slide_to_roll",
+        "How far may a disk slide in a step and still come to roll at 2/3 of its speed?",
+        sliding,
+        "v dt / R",
+        (0.05, 0.1, 0.2, 0.4, 0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0),
+        ROLLING_OFF,
+        runs=4,
+    ),
+    rough(
+        "critical_slope",
+        "How near to the steepest slope for rolling does a disk still roll?",
+        # up to tan(angle) = 3 mu a solid disk rolls
+        lambda x, _run: on_floor(0.0, 0.25, 3 * 0.25 * (1 - x), 64),
+        "1 - tan(angle) / 3 mu",
+        (0.9, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 5e-3, 2e-3, 1e-3, 1e-4, 1e-5),
+        SLIPS,
+    ),
     rough(
         "creep_at_rest",
+        "For how many steps does a disk stay at rest in a corner?",
         in_corner,
         "steps",
         (100.0, 1e3, 1e4, 1e5),

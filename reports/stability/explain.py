@@ -1,5 +1,5 @@
-"""Gives every limit its cause: the matching row of the table of reasons, or what was found by
-playing the failing run again.
+"""Gives every limit its cause: the matching row of the table of reasons, or what playing the
+failing run again shows.
 
 A reason is shown by the limit that it predicts, by the limit of a variant, by an intervention (the
 failing run with one thing changed works), or by an ablation: the reference with only these
@@ -9,7 +9,7 @@ reason that nothing shows is called likely.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatch
 from functools import partial
@@ -34,15 +34,19 @@ from crosscheck2d.reports.compare.causes import (
     by_mechanisms,
     unknown,
 )
-from crosscheck2d.reports.compare.faces import ALONG, first_on_line
+from crosscheck2d.reports.compare.collisions import ALONG, first_on_line
 from crosscheck2d.reports.compare.verdicts import Verdict
-from crosscheck2d.reports.stability.cases import CASES
-from crosscheck2d.reports.stability.limits import NEVER_FAILS, Case, Limit, LimitSearch
+from crosscheck2d.reports.stability.cases import CASES, GHOST, similar
+from crosscheck2d.reports.stability.limits import (
+    NEVER_FAILS,
+    Case,
+    DrivenEngine,
+    Limit,
+    LimitSearch,
+    play_as,
+)
 from crosscheck2d.reports.stability.predicates import REFUSED, judge
-from crosscheck2d.reports.stability.predicates_usable import GHOST
 from crosscheck2d.reports.stability.reasons import LAWS, Reason, reason_of
-from crosscheck2d.reports.stability.variants import DrivenEngine, play_as
-from crosscheck2d.reports.stability.vary import similar
 from crosscheck2d.scenarios.model import Array, Scenario, Scene
 from crosscheck2d.scenarios.truth.exact import with_oracle
 
@@ -57,22 +61,18 @@ SAYS_SO = "the engine's message says so"
 
 
 def explained(limits: Sequence[Limit]) -> list[Limit]:
-    """The limits with their causes, each shown where that is possible: by the limit itself, or by
-    the limit of its variant. A search that was lost has none."""
+    """The limits with their final causes, some shown by the limit of a variant. A search that was
+    lost has none."""
     by_name = {(limit.case, limit.engine): limit for limit in limits}
-    return [
-        replace(limit, cause=cause_of(limit, by_name)) if limit.status == "ok" else limit
-        for limit in limits
-    ]
+    return [replace(limit, cause=final_cause(limit, by_name)) for limit in limits]
 
 
-def cause_of(limit: Limit, by_name: Mapping[tuple[str, str], Limit]) -> Cause | None:
-    """Why it fails. A reason from the table that nothing else shows is replaced if an ablation
-    shows another cause."""
+def final_cause(limit: Limit, by_name: Mapping[tuple[str, str], Limit]) -> Cause | None:
+    # An ablation that shows another cause replaces a reason from the table that nothing else shows.
+    ablation = by_mechanisms(limit.mechanisms, limit.engine) if limit.mechanisms else None
     reason = reason_of(limit)
-    if reason is None:
-        varies = CASES[limit.case].varies if limit.case in CASES else limit.case.rpartition(":")[2]
-        return cause_by_replays(limit, varies)
+    if reason is None or limit.status != "ok":
+        return ablation or limit.cause
     law, shown = LAWS[reason.law], list[str]()
     text, source = law.text, law.source
     if predicted(limit, reason):
@@ -84,8 +84,7 @@ def cause_of(limit: Limit, by_name: Mapping[tuple[str, str], Limit]) -> Cause | 
         shown.append(f"{variant} gets farther")
     if limit.refused:
         shown.append(SAYS_SO)
-    if limit.mechanisms:
-        ablation = by_mechanisms(limit.mechanisms, limit.engine)
+    if ablation:
         if law.mechanism in limit.mechanisms:
             shown.append(ablation.shown)
         elif law.mechanism == LATE:  # which every ablation has
@@ -97,8 +96,6 @@ def cause_of(limit: Limit, by_name: Mapping[tuple[str, str], Limit]) -> Cause | 
 
 
 def predicted(limit: Limit, reason: Reason) -> bool:
-    """Whether the limit that follows from the reason lies in the bracket, or outside by no more
-    than the factor `NEAR`."""
     if reason.predicts is None:
         return False
     low, high = min(limit.works_at, limit.fails_at), max(limit.works_at, limit.fails_at)
@@ -106,66 +103,46 @@ def predicted(limit: Limit, reason: Reason) -> bool:
 
 
 def farther(varied: Limit, limit: Limit) -> bool:
-    """Whether `varied` fails at a harsher value than the other, or not at all."""
     if varied.verdict == NEVER_FAILS:
         return limit.verdict != NEVER_FAILS
     harsher = CASES[varied.case].harsher
     return harsher * varied.fails_at > harsher * limit.fails_at
 
 
-def cause_by_replays(limit: Limit, varied: str) -> Cause | None:
-    """The cause of a failure that has none in the table, as what removes it shows; None if nothing
-    failed."""
-    failing = limit.failing
-    if failing is None:
-        return None
-    if limit.settings_help:
-        return Cause(CauseKind.SETTING, limit.settings, shown="works with it")
-    if limit.mechanisms:
-        return by_mechanisms(limit.mechanisms, limit.engine)
-    ghost = f"a {GHOST}: " * (failing.broken == GHOST)
-    if intervention := INTERVENTIONS.get(limit.intervention):
-        shown = f"works {intervention.how}"
-        if intervention.reason is None:
-            cause = unknown(shown, "the step is too large for something in it")
-            return cause._replace(text=ghost + cause.text)
-        return Cause(CauseKind.INTERVENTION, ghost + intervention.reason, shown=shown)
-    if failing.broken == REFUSED:
-        return Cause(CauseKind.REFUSAL, "the engine refuses it", shown=SAYS_SO)
-    tried = dict.fromkeys(
-        intervention.how
-        for name, intervention in INTERVENTIONS.items()
-        if name not in FIRST and intervention.fits(limit.engine, varied)
-    )
-    also = f"it also fails {', '.join(tried)}" if tried else ""
-    return unknown("", also, limit.settings)
-
-
 def with_replays(search: LimitSearch, limit: Limit) -> Limit:
-    """The limit with what was found by playing its failing run again: the settings that remove it,
-    the mechanisms that are enough to produce it, or another intervention that removes it.
+    """The limit with what playing its failing run again shows: the settings that remove it, the
+    mechanisms that are enough to produce it, or another intervention that removes it.
 
     A reason from the table whose predicted limit fits needs no more; otherwise only an ablation can
     confirm it. In a scene of somebody's own, and as shipped in a case of one thing, the settings
     come first: they say what to do.
     """
-    reason = reason_of(limit)
-    if reason is not None and predicted(limit, reason):
+    reason, failing = reason_of(limit), limit.failing
+    if failing is None or (reason is not None and predicted(limit, reason)):
         return limit
+    if reason is not None:
+        return replace(limit, mechanisms=sufficient_mechanisms(search, limit))
     alone = limit.engine.endswith(":shipped") and not limit.case.startswith("dt_")
-    settings_first = reason is None and (alone or limit.case not in CASES)
+    settings_first, cause = alone or limit.case not in CASES, None
     if settings_first:
-        limit = replace(limit, intervention=intervention_of(search, limit, FIRST))
-        limit = limit if limit.intervention else with_settings(search, limit)
-        if limit.intervention or limit.settings_help:
-            return limit
-    limit = replace(limit, mechanisms=sufficient_mechanisms(search, limit))
-    if limit.mechanisms or reason:
-        return limit
-    limit = limit if settings_first else with_settings(search, limit)
-    if limit.settings_help:
-        return limit
-    return replace(limit, intervention=intervention_of(search, limit))
+        if cause := cause_by_intervention(search, limit, INTERVENTIONS[:1]):
+            return replace(limit, cause=cause)
+        cause = cause_by_settings(search, limit)
+        if cause.kind is CauseKind.SETTING:
+            return replace(limit, cause=cause)
+    if mechanisms := sufficient_mechanisms(search, limit):
+        return replace(limit, mechanisms=mechanisms)
+    settings = cause or cause_by_settings(search, limit)
+    if settings.kind is CauseKind.SETTING:
+        return replace(limit, cause=settings)
+    cause = cause_by_intervention(search, limit, INTERVENTIONS)
+    if cause is None and failing.broken == REFUSED:
+        cause = Cause(CauseKind.REFUSAL, "the engine refuses it", shown=SAYS_SO)
+    if cause is None:
+        rows = (row for row in INTERVENTIONS[1:] if row.fits(search.engine, search.case.varies))
+        tried = ", ".join(dict.fromkeys(row.how for row in rows))
+        cause = unknown("", f"it also fails {tried}" if tried else "", settings.text)
+    return replace(limit, cause=cause)
 
 
 def sufficient_mechanisms(search: LimitSearch, limit: Limit) -> tuple[str, ...]:
@@ -179,9 +156,9 @@ def sufficient_mechanisms(search: LimitSearch, limit: Limit) -> tuple[str, ...]:
     if ablations is None:
         return ()
     known = ablations.mechanisms
-    for alone in ([], *([*(x for x in known if x.name in one.on_top), one] for one in known)):
+    for alone in ([], *([*(x for x in known if x.name in top.on_top), top] for top in known)):
         if ablations.alike(alone):
-            return tuple(base.name for base in alone) or (LATE,)
+            return tuple(mechanism.name for mechanism in alone) or (LATE,)
     if not known or not ablations.alike(known):
         return ()
     return tuple(mechanism.name for mechanism in ablations.needed())
@@ -189,24 +166,16 @@ def sufficient_mechanisms(search: LimitSearch, limit: Limit) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Ablations:
-    """A case with the scenarios that fail and work next to a limit, the engine's mechanisms, and
-    the verdict on its failing run.
-
-    Attributes:
-        bad: the first run that failed.
-        good: all runs at the nearest value that works; empty if the engine works nowhere.
-    """
-
     case: Case
-    bad: Scenario
-    good: list[Scenario]
-    mechanisms: list[Mechanism]
-    verdict: Verdict
+    bad: Scenario  # the first run that failed
+    good: list[Scenario]  # all runs at the nearest value that works, if the engine works anywhere
+    mechanisms: list[Mechanism]  # of the engine
+    verdict: Verdict  # on the engine's failing run
 
     @staticmethod
     def of(search: LimitSearch, limit: Limit) -> Ablations | None:
         """None if nothing failed, nothing was played, or the engine has no known mechanisms."""
-        failure, failing = search.failure(limit), limit.failing
+        failure, failing = search.seen.get(limit.fails_at), limit.failing
         name, _, variant = search.engine.partition("+")
         if failure is None or failing is None or name not in MECHANISMS:
             return None
@@ -223,8 +192,7 @@ class Ablations:
         return Ablations(search.case, bad, good, mechanisms, verdict)
 
     def needed(self) -> list[Mechanism]:
-        """The mechanisms that remain after removing, one after the other, each one without which
-        the ablation still has the limit."""
+        # one after the other each is removed without which the ablation still has the limit
         needed = self.mechanisms
         for mechanism in self.mechanisms:
             fewer = [x for x in needed if x is not mechanism and mechanism.name not in x.on_top]
@@ -243,23 +211,19 @@ class Ablations:
         return 1 / ALIKE <= verdict.value / self.verdict.value <= ALIKE
 
     def judge(self, scenario: Scenario, mechanisms: Sequence[Mechanism]) -> Verdict:
-        """The verdict of the predicate on the ablation's run or runs."""
         ablation = DrivenEngine("reference:ablation", partial(with_mechanisms, mechanisms))
         return judge(self.case.predicate, *self.case.play(ablation, scenario))
 
 
 def finer(scenario: Scenario, times: int = FINER) -> Scenario:
-    """The same scene in steps that are shorter by this factor."""
     return replace(scenario, substeps=(scenario.substeps[0] * times,))
 
 
 def at_home(scenario: Scenario) -> Scenario:
-    """The same scene, moved along x so that its middle is at the origin."""
     return similar(scenario, shift=-float(np.mean(scenario.scene.position[:, 0])))
 
 
 def joined(scenario: Scenario) -> Scenario:
-    """The same scene with walls that touch on one line joined into one."""
     walls, scene = list[Array](), scenario.scene
     lines = np.array([first_on_line(scene.walls, w) for w in range(len(scene.walls))])
     for line in np.unique(lines):
@@ -283,7 +247,7 @@ class Intervention(NamedTuple):
         reason: why it failed, if it works with the change; None: that is not known.
         how: the change in words.
         change: what is done to the scene, if anything.
-        engine: the engine that plays it instead; "": the same.
+        engine: that plays it instead, if another does.
     """
 
     engines: str
@@ -291,10 +255,9 @@ class Intervention(NamedTuple):
     reason: str | None
     how: str
     change: Callable[[Scenario], Scenario] | None = None
-    engine: str = ""
+    engine: str | None = None
 
     def fits(self, engine: str, varied: str) -> bool:
-        """Whether the change is tried for this engine and this parameter."""
         return fnmatch(engine, self.engines) and fnmatch(varied, self.varied)
 
 
@@ -303,53 +266,50 @@ FLOAT32 = "positions are float32, too coarse so far from the origin"
 TOO_LARGE = f"{ACTS_AT_END}, and the step is too large for that"
 UNSWEPT, EIGHTHS = "disks are not swept against each other", "in steps of an eighth"
 ORDERED, BULLETS = "reference:ordered", "box2d_v3:matched+bullets"
-INTERVENTIONS = {
-    "joined": Intervention("*", "*", PIECES, "on a floor of one wall", joined),
-    "at_home": Intervention("box2d*", "offset", FLOAT32, "at the origin", at_home),
-    "in_order": Intervention("reference:[el]*", "*", ACTS_AT_END, f"as {ORDERED}", engine=ORDERED),
+# In the order in which they are tried: changes of one thing only come first, a finer step comes
+# later. The settings of the engine come after the first row. Where the step itself is varied, a
+# finer one is not tried.
+INTERVENTIONS = (
+    Intervention("*", "*", PIECES, "on a floor of one wall", joined),
+    Intervention("box2d*", "offset", FLOAT32, "at the origin", at_home),
+    Intervention("reference:[el]*", "*", ACTS_AT_END, f"as {ORDERED}", engine=ORDERED),
     # For matter a smaller step is ambiguous: its friction, its friction of the air and its resting
     # threshold depend on the step, too.
-    "finer_matter": Intervention("matter:*", "[!d]*", None, EIGHTHS, finer),
-    "finer": Intervention("*", "[!d]*", TOO_LARGE, EIGHTHS, finer),
-    "swept": Intervention("box2d_v3:matched", "*", UNSWEPT, f"as {BULLETS}", engine=BULLETS),
-}
-"""In the order in which they are tried: changes of one thing only come first, a finer step comes
-later. The settings of the engine come after `FIRST`.
-
-Where the step itself is varied, a finer one is not tried.
-"""
-FIRST = ("joined",)
+    Intervention("matter:*", "[!d]*", None, EIGHTHS, finer),
+    Intervention("*", "[!d]*", TOO_LARGE, EIGHTHS, finer),
+    Intervention("box2d_v3:matched", "*", UNSWEPT, f"as {BULLETS}", engine=BULLETS),
+)
 
 
-def intervention_of(
-    search: LimitSearch, limit: Limit, names: Iterable[str] = tuple(INTERVENTIONS)
-) -> str:
-    """The first change of `names` with which the run that failed at the limit works; "" if none
-    does, or if nothing failed.
+def cause_by_intervention(
+    search: LimitSearch, limit: Limit, interventions: Sequence[Intervention]
+) -> Cause | None:
+    """From the first change with which the run that failed at the limit works."""
+    scenario, failed = search.seen[limit.fails_at]
+    if failed.status == "unsupported":  # a refusal needs no other explanation
+        return None
+    predicate = search.case.predicate
+    for row in interventions:
+        if not row.fits(search.engine, search.case.varies):
+            continue
+        changed = row.change(scenario) if row.change else scenario
+        if judge(predicate, changed, play_as(row.engine or search.engine, changed)).failed:
+            continue
+        ghost = f"a {GHOST}: " * (limit.failing is not None and limit.failing.broken == GHOST)
+        shown = f"works {row.how}"
+        if row.reason is not None:
+            return Cause(CauseKind.INTERVENTION, ghost + row.reason, shown=shown)
+        cause = unknown(shown, "the step is too large for something in it")
+        return cause._replace(text=ghost + cause.text)
+    return None
 
-    A refusal needs no other explanation.
-    """
-    failure = search.failure(limit)
-    if failure is None or failure[1].status == "unsupported":
-        return ""
-    for name in names:
-        intervention = INTERVENTIONS[name]
-        if intervention.fits(search.engine, search.case.varies):
-            change = intervention.change
-            scenario = change(failure[0]) if change else failure[0]
-            run = play_as(intervention.engine or search.engine, scenario)
-            if not judge(search.case.predicate, scenario, run).failed:
-                return name
-    return ""
 
-
-def with_settings(search: LimitSearch, limit: Limit) -> Limit:
-    """The limit with the settings of the engine with which the run that failed at it works, or with
-    those that do not help."""
-    failure = search.failure(limit)
-    if failure is None or failure[1].status == "unsupported" or "+" in search.engine:
-        return limit
-    scenario, predicate = failure[0], search.case.predicate
+def cause_by_settings(search: LimitSearch, limit: Limit) -> Cause:
+    """From the settings of the engine with which the run that failed at the limit works; else of
+    kind unknown, with those that do not help."""
+    (scenario, failed), predicate = search.seen[limit.fails_at], search.case.predicate
+    if failed.status == "unsupported" or "+" in search.engine:
+        return Cause(CauseKind.UNKNOWN, "")
 
     def error(parameters: Mapping[str, Any]) -> float:
         chosen, steps = without_finer(parameters)
@@ -362,6 +322,6 @@ def with_settings(search: LimitSearch, limit: Limit) -> Limit:
 
     dt = scenario.dt(scenario.substeps[0])
     remedy = find_remedy(settings_of(search.engine, scenario.scene, dt), error, bound=1.0)
-    helps = bool(remedy.settings) and remedy.after <= 1.0
-    words = remedy.sentence(search.engine) if helps else remedy._replace(settings=()).sentence("")
-    return replace(limit, settings=words, settings_help=helps)
+    if remedy.settings and remedy.after <= 1.0:
+        return Cause(CauseKind.SETTING, remedy.sentence(search.engine), shown="works with it")
+    return Cause(CauseKind.UNKNOWN, remedy._replace(settings=()).sentence(""))

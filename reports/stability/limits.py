@@ -1,25 +1,90 @@
-"""What a case of the stability report asks, what a limit is, and the search for it: a scan from
-gentle to harsh up to the first failure, then bisection."""
+"""What a case of the stability report asks, the engines that play it, what a limit is, and the
+search for it: a scan from gentle to harsh up to the first failure, then bisection."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import pairwise
 from math import isfinite, isnan, nan, sqrt
+from typing import Any, NamedTuple
 
-from crosscheck2d.adapters.engines import DISTINCT
+from crosscheck2d.adapters.engine import Engine
+from crosscheck2d.adapters.engine_row import EngineRow
+from crosscheck2d.adapters.engines import DISTINCT, ENGINES, changed, row_of
+from crosscheck2d.adapters.play import play_once
 from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.compare.causes import Cause
 from crosscheck2d.reports.compare.verdicts import Verdict
 from crosscheck2d.reports.stability.predicates import REFUSED, Predicate, judge
-from crosscheck2d.reports.stability.variants import (
-    DRIVEN_ENGINES,
-    WITH_FRICTION_ONLY,
-    DrivenEngine,
-    played,
-)
-from crosscheck2d.scenarios.model import Scenario
+from crosscheck2d.scenarios.model import Scenario, Scene
+
+
+class DrivenEngine(NamedTuple):
+    """An engine or a variant: its name, `engine:profile` or `engine:profile+variant`; the function
+    that makes it; and what is changed in it, "" for an engine as in its row."""
+
+    name: str
+    make: Callable[[], Engine]
+    change: str = ""
+
+
+def make_variant(name: str, variant: str) -> Any:
+    # changed at once, and right after `load`
+    settings, _, loaded = ENGINES[name].variants[variant]
+    engine: Any = changed(name, **settings)
+    if loaded is None:
+        return engine
+    load, change = engine.load, loaded
+
+    def load_and_change(scene: Scene, dt: float) -> None:
+        load(scene, dt)
+        change(engine)
+
+    engine.load = load_and_change
+    return engine
+
+
+def with_variant(variant: str) -> tuple[str, ...]:
+    return tuple(f"{name}+{variant}" for name, row in ENGINES.items() if variant in row.variants)
+
+
+WITH_FRICTION_ONLY = tuple(name for name, row in ENGINES.items() if row.adds_friction)
+
+# `engine:profile`, and after all of these `engine:profile+variant` -> the engine.
+DRIVEN_ENGINES: dict[str, DrivenEngine] = {
+    name: DrivenEngine(name, row.make) for name, row in ENGINES.items()
+} | {
+    f"{name}+{variant}": DrivenEngine(
+        f"{name}+{variant}", partial(make_variant, name, variant), what
+    )
+    for name, row in ENGINES.items()
+    for variant, (_, what, _) in row.variants.items()
+}
+
+
+@contextmanager
+def taking_part(rows: Mapping[str, EngineRow]) -> Iterator[None]:
+    """In this context engines' own files, `PATH:own`, and rows of `FETCHED` are tested in this
+    process like the rows of `ENGINES`."""
+    ENGINES.update(rows)
+    DRIVEN_ENGINES.update({name: DrivenEngine(name, row.make) for name, row in rows.items()})
+    try:
+        yield
+    finally:
+        for name in rows:
+            del ENGINES[name], DRIVEN_ENGINES[name]
+
+
+def played(driven: DrivenEngine, scenario: Scenario) -> Run:
+    return play_once(driven.make, driven.name, scenario, scenario.dt(scenario.substeps[0]))
+
+
+def play_as(engine: str, scenario: Scenario) -> Run:
+    return played(DRIVEN_ENGINES.get(engine) or DrivenEngine(engine, row_of(engine).make), scenario)
+
 
 EXACT = "the exact answer"
 LIMIT, NEVER_FAILS = "limit", "does not fail"
@@ -28,22 +93,12 @@ NEVER_WORKS, ONLY_BEYOND = "never works", "works only beyond"
 
 @dataclass(frozen=True)
 class Form:
-    """How thorough a search is.
-
-    Attributes:
-        few: runs at a value that is only scanned; next to the limit a value gets all runs of
-            its case.
-        ratio: the ratio of failing to working value at which bisection stops.
-        whole: whether every run at every value is played, also after a failure, and whether
-            the scan has the values that only this form has.
-        timeout: s a case may take on one engine.
-    """
-
     name: str
-    few: int
-    ratio: float
+    few: int  # runs at a value that is only scanned; next to the limit all runs are played
+    ratio: float  # of failing to working value, at which bisection stops
+    # every run at every value is played, also after a failure, and more values are scanned
     whole: bool
-    timeout: float
+    timeout: float  # s that a case may take on one engine
 
 
 # A gas meets a bad cluster of contacts sooner or later: one in 20 of pymunk's gases is off by 1 %
@@ -57,7 +112,6 @@ FORMS = {form.name: form for form in (QUICK, FULL)}
 
 
 def once(driven: DrivenEngine, scenario: Scenario) -> tuple[Scenario, Run]:
-    """One run, judged by the scenario's own truth or by the laws of physics."""
     return scenario, played(driven, scenario)
 
 
@@ -67,12 +121,12 @@ class Case:
 
     Attributes:
         name: lower-case words, as they stand in limits.csv.
+        asks: the question in one sentence.
         scene: (value, number of the run from 0) -> the scenario; it is played at its only step
             size. Fewer runs are the first of more.
         parameter: what is varied, dimensionless where it can be.
         values: to scan, from gentle to harsh.
         predicate: decides whether a run fails.
-        asks: the question in one sentence, if it is not the first of the docstring of `scene`.
         unit: of the parameter; "1" for a ratio.
         runs: at a value: 1 where nothing differs, else phases of the collision within a step, or
             seeds.
@@ -93,11 +147,11 @@ class Case:
     """
 
     name: str
+    asks: str
     scene: Callable[[float, int], Scenario]
     parameter: str
     values: tuple[float, ...]
     predicate: Predicate
-    asks: str = ""
     unit: str = "1"
     runs: int = 1
     whole: bool = False
@@ -111,32 +165,20 @@ class Case:
     report: str = ""
 
     @property
-    def question(self) -> str:
-        """What it asks, in one sentence."""
-        return self.asks or " ".join((self.scene.__doc__ or "").split("\n\n")[0].split())
-
-    @property
     def harsher(self) -> int:
-        """1 if larger values are harsher, -1 if smaller values are."""
         return 1 if self.values[-1] > self.values[0] else -1
 
     @property
     def varies(self) -> str:
-        """The name of what is varied; for a scene file (FILE.toml:speed) the word that `--vary`
-        takes."""
+        # for a scene file (FILE.toml:speed) the word that `--vary` takes
         return self.name.rpartition(":")[2] if ":" in self.name else self.parameter
 
     def with_unit(self, text: str) -> str:
-        """The text and the parameter's unit, if it has one."""
         return text if self.unit == "1" else f"{text}, {self.unit}"
 
     def scan(self, form: Form) -> tuple[float, ...]:
-        """The values to scan. The full form adds the values half-way between them, so that it
-        contains the quick form's.
-
-        None are added where runs may fail by chance: with more values, too many failures by
-        chance become likelier.
-        """
+        # The full form contains the values of the quick one. None are added where runs may fail by
+        # chance: with more values, too many failures by chance become likelier.
         if not form.whole:
             return self.quick_values or self.values
         if not self.refines or self.by_chance:
@@ -180,7 +222,6 @@ class Trial:
 
     @property
     def works(self) -> bool:
-        """Whether no more runs failed than may fail by chance."""
         return self.failed <= self.allowed
 
 
@@ -202,10 +243,6 @@ class Limit:
             beyond, or fails at the gentlest as well.
         spacing: the resolution: the largest ratio of two neighbours among the values tried, up to
             the first failure.
-        intervention: the change of `INTERVENTIONS` with which the failing run works; "" if none was
-            found, or looked for.
-        settings: of the engine with which the failing run works, in words; without `settings_help`
-            those that do not help; "" if none were tried.
         mechanisms: with which the reference has this limit, as `sufficient_mechanisms`; () if none
             were found, or looked for.
         cause: why it fails; None where nothing failed.
@@ -223,9 +260,6 @@ class Limit:
     trials: tuple[Trial, ...]
     monotone: bool = True
     spacing: float = nan
-    intervention: str = ""
-    settings: str = ""
-    settings_help: bool = False
     mechanisms: tuple[str, ...] = ()
     cause: Cause | None = None
     replay: str = ""
@@ -234,26 +268,20 @@ class Limit:
 
     @property
     def failing(self) -> Trial | None:
-        """The trial at `fails_at`."""
         return next((trial for trial in self.trials if trial.value == self.fails_at), None)
 
     @property
     def refused(self) -> bool:
-        """Whether the engine does not play what it meets at `fails_at`: that is no limit of it."""
+        # what an engine does not play is no limit of it
         return self.failing is not None and self.failing.broken == REFUSED
 
     @property
     def runs(self) -> int:
-        """The number of runs on which it rests."""
         return sum(trial.runs for trial in self.trials)
 
 
 def engines_of(case: Case, rows: Container[str] = DISTINCT) -> list[str]:
-    """The engines that play a case: these rows of `ENGINES`, and the variants that the case
-    names, in the order of `DRIVEN_ENGINES`.
-
-    An engine that only adds friction to another plays only the cases that name it.
-    """
+    # An engine that only adds friction to another plays only the cases that name it.
     return [
         name
         for name in DRIVEN_ENGINES
@@ -263,8 +291,8 @@ def engines_of(case: Case, rows: Container[str] = DISTINCT) -> list[str]:
 
 @dataclass
 class LimitSearch:
-    """The search for the limit of one case on one engine; keeps the verdicts at each value, and the
-    first failing run there."""
+    """The search for the limit of one case on one engine; keeps the verdicts at each value, and in
+    `seen` the first failing run there."""
 
     case: Case
     engine: str
@@ -272,14 +300,7 @@ class LimitSearch:
     readings: dict[float, list[Verdict]] = field(default_factory=dict)
     seen: dict[float, tuple[Scenario, Run]] = field(default_factory=dict)
 
-    @property
-    def allowed(self) -> int:
-        """The number of runs at a value that may fail by chance."""
-        return int(self.case.by_chance * self.case.runs)
-
     def limit(self) -> Limit:
-        """Scan to the first failure and bisect between it and the value before; harsher values
-        are played too."""
         scan, few = self.case.scan(self.form), self.form.few
         if self.case.by_chance:  # at least half of the runs
             few = max(few, self.case.runs // 2)
@@ -298,62 +319,46 @@ class LimitSearch:
         return self.limit_of(ONLY_BEYOND, *self.bracket(scan[edge], scan[edge - 1]))
 
     def bracket(self, good: float, bad: float) -> tuple[float, float]:
-        """The working and the failing value after bisection, as close as form and case demand."""
         ratio = max(self.form.ratio, self.case.ratio)
         while self.case.refines and (middle := self.case.half_way(good, bad, ratio)) is not None:
             good, bad = (middle, bad) if self.trial(middle).works else (good, middle)
         return good, bad
 
     def trial(self, value: float, runs: int = ALL, to_the_end: bool = False) -> Trial:
-        """Play up to `runs` runs at a value, and stop when more have failed than may (not in the
-        full form).
-
-        If a run failed and some may fail by chance, all runs are played.
-        """
-        most, readings = self.case.runs, self.readings.setdefault(value, [])
+        """Play up to `runs` runs at a value; all of them if one fails. Stops when more have failed
+        than may, but in the full form."""
+        case, readings = self.case, self.readings.setdefault(value, [])
+        allowed = int(case.by_chance * case.runs)
         failed = sum(reading.failed for reading in readings)
-        while len(readings) < (most if failed or to_the_end else min(runs, most)):
-            if failed > self.allowed and not (self.form.whole or to_the_end):
+        while len(readings) < (case.runs if failed or to_the_end else min(runs, case.runs)):
+            if failed > allowed and not (self.form.whole or to_the_end):
                 break
-            scenario, run = self.case.play(
-                DRIVEN_ENGINES[self.engine], self.case.scene(value, len(readings))
-            )
-            readings.append(judge(self.case.predicate, scenario, run))
+            driven, scene = DRIVEN_ENGINES[self.engine], case.scene(value, len(readings))
+            scenario, run = case.play(driven, scene)
+            readings.append(judge(case.predicate, scenario, run))
             if readings[-1].failed:
                 failed += 1
                 self.seen.setdefault(value, (scenario, run))
-        return self.tried(value)
-
-    def tried(self, value: float) -> Trial:
-        """The trial of a value from the readings so far."""
-        readings = self.readings[value]
-        count, failed = len(readings), sum(reading.failed for reading in readings)
         worst = max((r.value for r in readings if isfinite(r.value)), default=nan)
         if not failed:
-            return Trial(value, count, failed, worst)
-        first, verdict = next((k, each) for k, each in enumerate(readings) if each.failed)
+            return Trial(value, len(readings), failed, worst)
+        first, verdict = next((k, reading) for k, reading in enumerate(readings) if reading.failed)
         disk = verdict.disks[0] if verdict.disks else -1
         happens = verdict.at, verdict.text, verdict.id, disk
-        left = count < self.case.runs
-        return Trial(value, count, failed, worst, first, *happens, self.allowed, left)
+        left = len(readings) < case.runs
+        return Trial(value, len(readings), failed, worst, first, *happens, allowed, left)
 
     def limit_of(self, verdict: str, works_at: float, fails_at: float) -> Limit:
-        """The limit with all trials from gentle to harsh; at its failing value every run is
-        played."""
         if not isnan(fails_at):
             self.trial(fails_at, to_the_end=True)
         values = sorted(self.readings, key=lambda x: self.case.harsher * x)
-        trials = tuple(self.tried(value) for value in values)
+        trials = tuple(self.trial(value, 0) for value in values)
         changes = sum(before.works != after.works for before, after in pairwise(trials))
         if verdict == LIMIT:
             values = values[: values.index(fails_at) + 1]
         spacing = max((max(a / b, b / a) for a, b in pairwise(values)), default=nan)
         names = self.case.name, self.engine, self.form.name
         return Limit(*names, verdict, works_at, fails_at, trials, changes <= 1, spacing)
-
-    def failure(self, limit: Limit) -> tuple[Scenario, Run] | None:
-        """The first run that failed at the limit, for the replay; None if none failed."""
-        return self.seen.get(limit.fails_at)
 
 
 def first_edge(works: Sequence[bool]) -> int | None:

@@ -35,11 +35,9 @@ MARKS = {
     "≥": "fails at this value and above, works below",
     "*": "works again at a harsher value, or also fails at the gentlest value",
 }
-"""Mark in a table of limits -> its meaning."""
 
 
 def in_words(limit: Limit) -> str:
-    """The limit in a few characters, with the marks of `MARKS`."""
     if limit.status != "ok":
         return limit.status
     if limit.verdict == NEVER_FAILS:
@@ -52,22 +50,18 @@ def in_words(limit: Limit) -> str:
 
 
 def sign(limit: Limit) -> str:
-    """What stands before `fails_at`: "≤" or "≥" if the engine fails up to there and works
-    beyond."""
     if limit.verdict != ONLY_BEYOND:
         return ""
     return "≤" if limit.works_at > limit.fails_at else "≥"
 
 
 def bracket(limit: Limit) -> tuple[str, str]:
-    """The values where it works and where it fails, as text."""
     works = "nowhere" if isnan(limit.works_at) else number(limit.works_at, 4)
     fails = "nowhere tried" if isnan(limit.fails_at) else sign(limit) + number(limit.fails_at, 4)
     return works, fails
 
 
 def why(limit: Limit) -> str:
-    """The cause as a sentence."""
     if limit.cause is None:
         return "" if limit.verdict == NEVER_FAILS else "Not explained."
     text = limit.cause.sentence
@@ -75,8 +69,6 @@ def why(limit: Limit) -> str:
 
 
 def where_it_works(limit: Limit) -> str:
-    """The values at which it works and fails, from gentle to harsh; "" if there is only one
-    change."""
     if limit.monotone:
         return ""
     parts = []
@@ -88,13 +80,12 @@ def where_it_works(limit: Limit) -> str:
 
 
 def held(case: Case) -> dict[str, str]:
-    """Symbol -> value with unit of what the numbers of a case depend on and it does not vary: the
-    step size dt and the radii R of the disks that move. A symbol is left out if it varies, and R if
-    no disk moves."""
+    """Symbol -> value with unit: the step size dt and the radii R of the disks that move, where the
+    case does not vary them."""
     ends = [case.scene(value, 0) for value in (case.values[0], case.values[-1])]
     steps = {end.dt(end.substeps[0]) for end in ends}
     radii = [end.scene.radius[~end.scene.static] for end in ends]
-    least, most = ({float(pick(each)) for each in radii if len(each)} for pick in (np.min, np.max))
+    least, most = ({float(pick(r)) for r in radii if len(r)} for pick in (np.min, np.max))
     symbols = {}
     if len(steps) == 1:
         symbols["dt"] = f"{number(1e3 * steps.pop())} ms"
@@ -106,14 +97,12 @@ def held(case: Case) -> dict[str, str]:
 
 
 def in_report(case: Case) -> str:
-    """How the report judges the scene `case.report`, and how its question differs from the case's;
-    "" if the case names none."""
     if not case.report:
         return ""
     reported, here = scenario(case.report), case.scene(case.values[0], 0)
     dt = number(1e3 * reported.dt(reported.middle_substeps))
-    kept = held(case).get("dt")
-    varies = f"dt is {kept}" if kept else "dt is varied"
+    dt_here = held(case).get("dt")
+    varies = f"dt is {dt_here}" if dt_here else "dt is varied"
     if np.array_equal(reported.scene.position, here.scene.position):
         differ = f"the same scene, at dt {dt} ms; here {varies}"
     else:
@@ -128,12 +117,10 @@ def in_report(case: Case) -> str:
 
 
 def setting(scene: Scenario) -> str:
-    """How many walls a scene has, and how long it lasts."""
     return f"{counted(len(scene.scene.walls), 'wall')} for {number(scene.duration)} s"
 
 
 def findings(limits: Sequence[Limit]) -> list[str]:
-    """A few sentences with counts of the limits of the engines, without their variants."""
     limits = [limit for limit in limits if limit.engine in ENGINES]
     cases = {limit.case for limit in limits}
     failing = [limit for limit in limits if limit.verdict != NEVER_FAILS]
@@ -170,9 +157,7 @@ def findings(limits: Sequence[Limit]) -> list[str]:
 
 
 def fewest_and_most(limits: Sequence[Limit], which: str) -> list[str]:
-    """A sentence that names the engines that fail in the fewest and in the most of these cases,
-    among those that model any of them, and which of the libraries fail in the fewest if all of the
-    former are this project's; none for a single case, or if no engine fails."""
+    # among those that model any of these cases; libraries apart if all in front are this project's
     taken = [x for x in limits if not (x.verdict == NEVER_WORKS and x.refused) or x.status != "ok"]
     fails = dict.fromkeys((limit.engine for limit in taken), 0)
     for limit in limits:
@@ -191,7 +176,6 @@ def fewest_and_most(limits: Sequence[Limit], which: str) -> list[str]:
 
 
 def engines_with(fails: Mapping[str, int], extreme: Callable[[Iterable[int]], int]) -> str:
-    """The engines that fail in the fewest or in the most cases, with the number of these."""
     count = extreme(fails.values())
     names = [engine for engine, number in fails.items() if number == count]
     return f"{listed(names)} ({count})"

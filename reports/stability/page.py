@@ -26,7 +26,7 @@ from crosscheck2d.reports.page.kit import (
 )
 from crosscheck2d.reports.page.links import neighbours
 from crosscheck2d.reports.page.style import TRUTH, number
-from crosscheck2d.reports.stability.cases import FAMILY_OF
+from crosscheck2d.reports.stability.cases import FAMILY_OF, case_named
 from crosscheck2d.reports.stability.limits import (
     EXACT,
     FORMS,
@@ -46,7 +46,7 @@ from crosscheck2d.reports.stability.overview import (
     why,
 )
 from crosscheck2d.reports.stability.predicates import REFUSED, Predicate
-from crosscheck2d.reports.stability.results import StabilityResults, case_named
+from crosscheck2d.reports.stability.results import StabilityResults
 from crosscheck2d.reports.stability.tables import (
     AT_ONCE,
     GAPS,
@@ -83,7 +83,6 @@ WHICH_LAW = (
 
 
 def write_page(path: Path, results: StabilityResults) -> None:
-    """Write the page of a stability report to `path`."""
     names = list(dict.fromkeys(result.engine for result in results.all))
     sections = [
         *limit_sections(results.limits, names),
@@ -105,7 +104,6 @@ def write_page(path: Path, results: StabilityResults) -> None:
 
 
 def lead(results: StabilityResults, names: Sequence[str]) -> list[str | Markup]:
-    """What a limit is, and what is counted."""
     form, changed = FORMS[results.header["form"]], [name for name in names if "+" in name]
     how = (
         "The full form plays all runs of a case at every value, and values half way between those"
@@ -140,7 +138,6 @@ def lead(results: StabilityResults, names: Sequence[str]) -> list[str | Markup]:
 
 
 def limit_sections(limits: Sequence[Limit], names: Sequence[str]) -> list[Section]:
-    """What was found in a few sentences, and the table of limits, whose rows open."""
     if not limits:
         return []
     by_case: dict[str, list[Limit]] = {}
@@ -153,7 +150,7 @@ def limit_sections(limits: Sequence[Limit], names: Sequence[str]) -> list[Sectio
         label = name if name in FAMILY_OF else Path(name).name
         kept = ", ".join(f"{symbol} {value}" for symbol, value in held(case).items())
         note = "; ".join(filter(None, [case.with_unit(case.parameter), kept]))
-        index.append(TableCell(label, title=case.question, notes=(TableCell(note, css="soft"),)))
+        index.append(TableCell(label, title=case.asks, notes=(TableCell(note, css="soft"),)))
         rows.append([cell_of(case, of_engine.get(engine)) for engine in engines])
         groups.append(FAMILY_OF.get(name, "A scene of your own"))
         opens[label] = case_parts(case, members)
@@ -169,7 +166,7 @@ def limit_sections(limits: Sequence[Limit], names: Sequence[str]) -> list[Sectio
 
 
 def cell_of(case: Case, limit: Limit | None) -> TableCell:
-    """A limit in the overview; the gentler the value at which it fails, the deeper its colour."""
+    # the gentler the value at which it fails, the deeper its colour
     if limit is None:
         return TableCell("")
     if limit.verdict == NEVER_FAILS:
@@ -182,8 +179,6 @@ def cell_of(case: Case, limit: Limit | None) -> TableCell:
 
 
 def case_parts(case: Case, limits: Sequence[Limit]) -> list[Part]:
-    """What opens below the row of a case: its facts, its limits, every cause once, the failing
-    runs, and all readings."""
     engines: dict[tuple[str, str, str], list[str]] = {}
     for limit in limits:
         if limit.verdict != NEVER_FAILS:
@@ -194,7 +189,7 @@ def case_parts(case: Case, limits: Sequence[Limit]) -> list[Part]:
         beside = "; ".join(filter(None, [source, f"tested: {shown}" if shown else ""]))
         cause = Markup("<b>{}</b>: {} <small>{}</small>")
         causes.append(cause.format(", ".join(names), text, beside))
-    asks = Text([Markup("<b>{}</b>").format(case.question), *facts(case)])
+    asks = Text([Markup("<b>{}</b>").format(case.asks), *facts(case)])
     folds = [replay_of(case, limit) for limit in limits if limit.failing and limit.replay]
     parts: list[Part] = [asks, limit_table(limits), Text(items=causes)]
     if folds:
@@ -203,7 +198,6 @@ def case_parts(case: Case, limits: Sequence[Limit]) -> list[Part]:
 
 
 def facts(case: Case) -> list[str]:
-    """What is varied, what failing is, what is played, and how the report asks."""
     predicate = case.predicate
     span = f"from {number(case.values[0])} to {number(case.values[-1])}"
     runs = "Runs: one at each value; nothing in it is random"
@@ -224,12 +218,10 @@ def facts(case: Case) -> list[str]:
 
 
 def above(predicate: Predicate) -> str:
-    """Beyond which number a run fails."""
     return f"above {number(predicate.bound)} {predicate.unit}".removesuffix(" 1")
 
 
 def limit_table(limits: Sequence[Limit]) -> Table:
-    """The brackets of a case, what they rest on, and what happened."""
     rows = []
     for limit in limits:
         works, fails = bracket(limit)
@@ -249,7 +241,6 @@ def limit_table(limits: Sequence[Limit]) -> Table:
 
 
 def replay_of(case: Case, limit: Limit) -> Section:
-    """The first failing run at the limit, folded."""
     assert limit.failing is not None
     label = f"{case.parameter} = {number(limit.failing.value)}: {limit.failing.event}"
     beside = EXACT if case.shown_with == EXACT else f"the same gas {case.shown_with}"
@@ -299,7 +290,6 @@ def readings(case: Case, limits: Sequence[Limit]) -> Chart | Text:
 
 
 def map_section(maps: Sequence[MapOf]) -> Section:
-    """How many values of each map an engine fails at; its rows open on the maps themselves."""
     engines = list(dict.fromkeys(result.engine for result in maps))
     drawn = {(result.engine, result.name): result for result in maps}
     names = [name for name in MAPS if any(result.name == name for result in maps)]
@@ -328,8 +318,7 @@ def map_section(maps: Sequence[MapOf]) -> Section:
 
 
 def grid(result: MapOf) -> Table:
-    """A map: a row for each y, from large to small, a column for each x; a reading is coloured by
-    its share of the bound."""
+    # a reading is coloured by its share of the bound
     chart, at = MAPS[result.name], dict[tuple[float, float], TableCell]()
     for x, y, value, failed, kind, event in result.cells:
         happens = f"{kind}: {event}" if failed else ""
@@ -352,7 +341,6 @@ def grid(result: MapOf) -> Table:
 
 
 def law_section(laws: Sequence[LawOf]) -> Section:
-    """The law that each engine follows where a disk strikes touching disks."""
     ordered = [law for name in TOUCHING for law in laws if law.name == name]
     rows = []
     for law in ordered:
@@ -374,7 +362,6 @@ def law_section(laws: Sequence[LawOf]) -> Section:
 
 
 def law_cell(at: AtGap) -> TableCell:
-    """The law that an engine follows at a gap, with a colour where it follows none."""
     if not at.velocity:
         return TableCell(at.law, css="bad")
     motion = "; ".join(f"({number(x, 2)}, {number(y, 2)})" for x, y in at.velocity)

@@ -33,22 +33,18 @@ class Predicate(NamedTuple):
 
     Attributes:
         name: the id of its verdict, as it stands in limits.csv.
+        means: what failing is, as a part of a sentence.
         unit: of the number.
         bound: the largest that still works.
-        read: scenario and run, played to its end -> the verdict; its docstring says what failing
-            is. A verdict of another name says what in particular has failed.
+        read: scenario and run, played to its end -> the verdict. A verdict of another name says
+            what in particular has failed.
     """
 
     name: str
+    means: str
     unit: str
     bound: float
     read: Callable[[Scenario, Trajectory], Verdict]
-
-    @property
-    def means(self) -> str:
-        """What failing is, as a part of a sentence."""
-        text = " ".join((self.read.__doc__ or "").split()).rstrip(".")
-        return text[:1].lower() + text[1:]
 
 
 def judge(predicate: Predicate, scenario: Scenario, run: Run) -> Verdict:
@@ -71,7 +67,7 @@ def read(value: float, at: float, event: str, disk: int | None = 0, kind: str = 
 
 
 def worst_of(verdicts: list[Verdict]) -> Verdict:
-    """The one that is farthest above its bound, all of them in units of their bounds."""
+    # all of them are in units of their bounds
     return max(verdicts, key=lambda verdict: verdict.value)
 
 
@@ -92,25 +88,17 @@ def largest(
 
 
 def truth_of(scenario: Scenario) -> Trajectory:
-    """The exact answer at the samples; every scenario of these cases has one."""
     assert scenario.truth is not None
     return scenario.truth(scenario.times)
 
 
 def worst_disk(series: Array) -> int:
-    """The disk with the largest of (n,) numbers; 0 if there is none."""
     return int(np.nanargmax(series)) if np.isfinite(series).any() else 0
 
 
-def change_of_velocity(trajectory: Trajectory) -> Array:
-    """(n,) m/s, of each disk from start to end."""
-    return laws.lengths(trajectory.velocity[-1] - trajectory.velocity[0])
-
-
 def collisions_missed(scenario: Scenario, played: Trajectory) -> Verdict:
-    """A disk passes through a disk or a wall that it should collide with."""
     true = truth_of(scenario)
-    expected, change = change_of_velocity(true), change_of_velocity(played)
+    expected, change = (laws.lengths(x.velocity[-1] - x.velocity[0]) for x in (true, played))
     missed = ((expected > 0) & (change < 0.01 * expected)).any()
     at, wall = float(true.collisions.t[0]), true.collisions.j[0] < 0
     through = "the disk passes through the wall" if wall else "the disks pass through each other"
@@ -118,14 +106,12 @@ def collisions_missed(scenario: Scenario, played: Trajectory) -> Verdict:
 
 
 def collisions_spurious(scenario: Scenario, played: Trajectory) -> Verdict:
-    """A disk that touches nothing is deflected."""
     change = laws.lengths(played.velocity - played.velocity[0]).max(axis=1)
     share = change / laws.lengths(scenario.scene.velocity).max()
     return largest(played.t, share, 1e-3, "a spurious collision: the disks do not touch")
 
 
 def restitution_off(scenario: Scenario, played: Trajectory) -> Verdict:
-    """The collision does not have the scene's e."""
     start, end = (float(v[0, 0] - v[1, 0]) for v in (played.velocity[0], played.velocity[-1]))
     e = -end / start
     at = truth_of(scenario).collisions.t[0]
@@ -133,9 +119,8 @@ def restitution_off(scenario: Scenario, played: Trajectory) -> Verdict:
 
 
 def wrong_distance(scenario: Scenario, played: Trajectory) -> Verdict:
-    """A free disk has not moved the right distance."""
     true = truth_of(scenario)
-    way, expected = (laws.lengths(each.position[-1] - each.position[0]) for each in (played, true))
+    way, expected = (laws.lengths(x.position[-1] - x.position[0]) for x in (played, true))
     off = np.abs(way - expected) / expected
     disk = worst_disk(off)
     event = f"disk {disk} has moved {way[disk] / expected[disk]:.4g} times the right distance"
@@ -143,7 +128,6 @@ def wrong_distance(scenario: Scenario, played: Trajectory) -> Verdict:
 
 
 def velocity_off(scenario: Scenario, played: Trajectory) -> Verdict:
-    """A disk leaves the collision with a wrong velocity."""
     true = truth_of(scenario)
     off = laws.lengths(played.velocity[-1] - true.velocity[-1])
     own = laws.lengths(true.velocity[-1])
@@ -153,14 +137,12 @@ def velocity_off(scenario: Scenario, played: Trajectory) -> Verdict:
 
 
 def scaled_deviation(scenario: Scenario, played: Trajectory) -> Verdict:
-    """The path, scaled back, differs from that at scale 1."""
     off = laws.lengths(played.position - truth_of(scenario).position) / scenario.scene.radius
     event = "from here the path differs from that at scale 1"
     return largest(played.t, off.max(axis=1), SCALED_DEVIATION.bound, event)
 
 
 def angle_off(scenario: Scenario, played: Trajectory) -> Verdict:
-    """The angle of a free disk does not follow its spin."""
     turned = played.t * scenario.scene.angular_velocity[0]
     off = np.abs(played.angle[:, 0] - turned)[1:] / turned[1:]
     event = f"turns {played.angle[-1, 0] / turned[-1]:.4g} times as far as it should"
@@ -168,7 +150,6 @@ def angle_off(scenario: Scenario, played: Trajectory) -> Verdict:
 
 
 def spring_grows(_: Scenario, played: Trajectory) -> Verdict:
-    """The energy of an oscillator doubles or halves."""
     energy = (played.velocity**2 + played.position**2).sum(axis=(1, 2)) / 2  # of 1 kg on 1 N/m
     quarter = len(energy) // 4
     # Means over a quarter of the run: the energy of a stable method oscillates within a period.
@@ -179,8 +160,8 @@ def spring_grows(_: Scenario, played: Trajectory) -> Verdict:
 
 
 def bounce_off(scenario: Scenario, played: Trajectory) -> Verdict:
-    """A bounce changes the height that the ball reaches."""
-    heights, scene = apexes(scenario, played), scenario.scene
+    scene, y = scenario.scene, played.position[:, 0, 1] - scenario.scene.radius[0]
+    heights = laws.apexes(y)[1] / y[0]  # of each flight, the drop itself first
     below = played.position[:, 0, 1] < 0
     if len(heights) < 2 or below[-1]:
         at = first_above(played.t, below.astype(float), 0.5)
@@ -196,16 +177,7 @@ def bounce_off(scenario: Scenario, played: Trajectory) -> Verdict:
     return read(np.abs(changes[worst]), first, event)
 
 
-def apexes(scenario: Scenario, played: Trajectory) -> Array:
-    """(k,) the height that a dropped ball reaches in each flight, the drop itself first, over
-    the height of the drop."""
-    y = played.position[:, 0, 1] - scenario.scene.radius[0]
-    heights: Array = laws.apexes(y)[1] / y[0]
-    return heights
-
-
 def friction_off(scenario: Scenario, played: Trajectory) -> Verdict:
-    """The impulse of friction is not that of Coulomb's law."""
     true, scene = truth_of(scenario), scenario.scene
     impulse, expected = friction_impulses(played, scene), friction_impulses(true, scene)
     off = np.abs(impulse - expected) / np.abs(expected)
@@ -227,11 +199,10 @@ def friction_impulses(trajectory: Trajectory, scene: Scene) -> Array:
 
 
 def rolling_off(scenario: Scenario, played: Trajectory) -> Verdict:
-    """A disk does not roll at the right speed after it has slid."""
     scene = scenario.scene
     speed, rim = (
-        np.stack([each.velocity[:, 0, 0], -scene.radius[0] * each.angular_velocity[:, 0]])
-        for each in (played, truth_of(scenario))
+        np.stack([run.velocity[:, 0, 0], -scene.radius[0] * run.angular_velocity[:, 0]])
+        for run in (played, truth_of(scenario))
     )
     off = np.abs(speed - rim).max(axis=0) / np.abs(scene.velocity[0, 0])
     moves, turns = speed[:, -1] / rim[:, -1]
@@ -240,7 +211,6 @@ def rolling_off(scenario: Scenario, played: Trajectory) -> Verdict:
 
 
 def slips(scenario: Scenario, played: Trajectory) -> Verdict:
-    """A disk slips on a slope on which it should roll."""
     along = played.velocity[1:, 0, 0]
     slip = along + scenario.scene.radius[0] * played.angular_velocity[1:, 0]
     share = np.abs(slip) / np.where(along, np.abs(along), np.nan)
@@ -249,7 +219,6 @@ def slips(scenario: Scenario, played: Trajectory) -> Verdict:
 
 
 def creeps(scenario: Scenario, played: Trajectory) -> Verdict:
-    """A disk at rest moves or turns after the first tenth of the run."""
     first = int(np.ceil(SETTLED * (len(played) - 1)))
     x, turned = played.position[:, 0], played.angle[:, 0]
     radius = scenario.scene.radius[0]
@@ -265,7 +234,6 @@ def fastest(played: Trajectory, scene: Scene) -> Array:
 
 
 def stands(scenario: Scenario, played: Trajectory) -> Verdict:
-    """A disk sinks by 0.1 radii, or jitters at 0.02 sqrt(g R)."""
     half, moved = len(played) // 2, laws.lengths(played.position - played.position[0])
     radii = (moved / scenario.scene.radius).max(axis=1)
     worst = int(np.argmax(moved[-1]))
@@ -282,20 +250,17 @@ def stands(scenario: Scenario, played: Trajectory) -> Verdict:
 
 
 def ejected(scenario: Scenario, played: Trajectory) -> Verdict:
-    """Two disks that start at rest separate at a speed."""
     speed = fastest(played, scenario.scene)
     at = first_above(played.t, speed, EJECTED.bound)
     return read(speed[-1], at, f"the disks separate at {speed[-1]:.3g} radii/s")
 
 
 def still_overlaps(scenario: Scenario, played: Trajectory) -> Verdict:
-    """An overlap is left after a second."""
     overlap = float(laws.penetration(played, scenario.scene)[-1])
     return read(overlap, played.t[-1], f"an overlap of {overlap:.3g} radii is left")
 
 
 def bursts(scenario: Scenario, played: Trajectory) -> Verdict:
-    """A disk leaves the box, or flies at 10 radii/s."""
     walls, x = scenario.scene.walls, played.position
     low, high = walls.min(axis=(0, 1)), walls.max(axis=(0, 1))
     outside = ((x < low) | (x > high)).any(axis=2).sum(axis=1)
@@ -310,28 +275,111 @@ def bursts(scenario: Scenario, played: Trajectory) -> Verdict:
 
 
 def not_at_rest(scenario: Scenario, played: Trajectory) -> Verdict:
-    """A disk that should be at rest moves."""
     late = played.velocity[-max(1, len(played) // 10) :]
     speed = np.sqrt((late**2).sum(axis=2).mean(axis=1)) / own_speed(scenario)
     event = f"still moves at {speed.max():.3g} sqrt(g R)"
     return read(speed.max(), played.t[-len(late)], event, None)
 
 
-COLLISIONS_MISSED = Predicate("collisions missed", "collisions", 0.0, collisions_missed)
-COLLISIONS_SPURIOUS = Predicate("spurious collisions", "of the speed", 1e-3, collisions_spurious)
-RESTITUTION_OFF = Predicate("restitution off", "1", 0.01, restitution_off)
-WRONG_DISTANCE = Predicate("wrong distance", "of the way", 0.01, wrong_distance)
-VELOCITY_OFF = Predicate("velocity off", "of the speed", 1e-3, velocity_off)
-SCALED_DEVIATION = Predicate("deviation", "radii", 0.25, scaled_deviation)
-ANGLE_OFF = Predicate("angle off", "of the angle", 0.02, angle_off)
-BOUNCES_OFF = Predicate("bounce off", "of the height", MOST_BOUNCE, bounce_off)
-SPRING_GROWS = Predicate("spring grows", "doublings of energy", 1.0, spring_grows)
-FRICTION_OFF = Predicate("friction off", "of the impulse", 0.1, friction_off)
-ROLLING_OFF = Predicate("rolling off", "of the start speed", 0.01, rolling_off)
-SLIPS = Predicate("slips", "of the speed", 0.05, slips)
-CREEPS = Predicate("creeps", "radii", 0.01, creeps)
-STANDS = Predicate("does not stand", "of the bound", 1.0, stands)
-EJECTED = Predicate("ejected", "radii/s", 0.1, ejected)
-STILL_OVERLAP = Predicate("still overlap", "radii", 0.02, still_overlaps)
-BURSTS = Predicate("bursts", "of the bound", 1.0, bursts)
-NOT_AT_REST = Predicate("not at rest", "sqrt(g R)", MOST_RESIDUAL, not_at_rest)
+COLLISIONS_MISSED = Predicate(
+    "collisions missed",
+    "a disk passes through a disk or a wall that it should collide with",
+    "collisions",
+    0.0,
+    collisions_missed,
+)
+COLLISIONS_SPURIOUS = Predicate(
+    "spurious collisions",
+    "a disk that touches nothing is deflected",
+    "of the speed",
+    1e-3,
+    collisions_spurious,
+)
+RESTITUTION_OFF = Predicate(
+    "restitution off", "the collision does not have the scene's e", "1", 0.01, restitution_off
+)
+WRONG_DISTANCE = Predicate(
+    "wrong distance",
+    "a free disk has not moved the right distance",
+    "of the way",
+    0.01,
+    wrong_distance,
+)
+VELOCITY_OFF = Predicate(
+    "velocity off",
+    "a disk leaves the collision with a wrong velocity",
+    "of the speed",
+    1e-3,
+    velocity_off,
+)
+SCALED_DEVIATION = Predicate(
+    "deviation",
+    "the path, scaled back, differs from that at scale 1",
+    "radii",
+    0.25,
+    scaled_deviation,
+)
+ANGLE_OFF = Predicate(
+    "angle off",
+    "the angle of a free disk does not follow its spin",
+    "of the angle",
+    0.02,
+    angle_off,
+)
+BOUNCES_OFF = Predicate(
+    "bounce off",
+    "a bounce changes the height that the ball reaches",
+    "of the height",
+    MOST_BOUNCE,
+    bounce_off,
+)
+SPRING_GROWS = Predicate(
+    "spring grows",
+    "the energy of an oscillator doubles or halves",
+    "doublings of energy",
+    1.0,
+    spring_grows,
+)
+FRICTION_OFF = Predicate(
+    "friction off",
+    "the impulse of friction is not that of Coulomb's law",
+    "of the impulse",
+    0.1,
+    friction_off,
+)
+ROLLING_OFF = Predicate(
+    "rolling off",
+    "a disk does not roll at the right speed after it has slid",
+    "of the start speed",
+    0.01,
+    rolling_off,
+)
+SLIPS = Predicate(
+    "slips", "a disk slips on a slope on which it should roll", "of the speed", 0.05, slips
+)
+CREEPS = Predicate(
+    "creeps",
+    "a disk at rest moves or turns after the first tenth of the run",
+    "radii",
+    0.01,
+    creeps,
+)
+STANDS = Predicate(
+    "does not stand",
+    "a disk sinks by 0.1 radii, or jitters at 0.02 sqrt(g R)",
+    "of the bound",
+    1.0,
+    stands,
+)
+EJECTED = Predicate(
+    "ejected", "two disks that start at rest separate at a speed", "radii/s", 0.1, ejected
+)
+STILL_OVERLAP = Predicate(
+    "still overlap", "an overlap is left after a second", "radii", 0.02, still_overlaps
+)
+BURSTS = Predicate(
+    "bursts", "a disk leaves the box, or flies at 10 radii/s", "of the bound", 1.0, bursts
+)
+NOT_AT_REST = Predicate(
+    "not at rest", "a disk that should be at rest moves", "sqrt(g R)", MOST_RESIDUAL, not_at_rest
+)

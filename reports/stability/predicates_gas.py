@@ -39,8 +39,7 @@ VIRIALS = (
 
 @cache
 def approximant() -> tuple[np.ndarray, np.ndarray]:
-    """Numerator and denominator, highest power first, of the Pade approximant [4/5] of the virial
-    series."""
+    # numerator and denominator, highest power first, of the Pade approximant [4/5] of the virials
     series = np.array(VIRIALS) * 2.0 ** np.arange(10)
     matrix = [[series[5 + k - m] if 5 + k - m >= 0 else 0.0 for m in range(1, 6)] for k in range(5)]
     below = np.append(1.0, np.linalg.solve(np.array(matrix), -series[5:10]))
@@ -104,7 +103,6 @@ RANGES = 5  # of speed, with equal numbers of disks
 
 
 def energy_drifts(scenario: Scenario, played: Trajectory) -> Verdict:
-    """The energy changes at e = 1."""
     energy = laws.energy(played, scenario.scene)
     off = np.abs(energy / energy[0] - 1)
     event = f"the energy is {energy[-1] / energy[0]:.4g} times that at the start"
@@ -112,7 +110,6 @@ def energy_drifts(scenario: Scenario, played: Trajectory) -> Verdict:
 
 
 def momentum_drifts(scenario: Scenario, played: Trajectory) -> Verdict:
-    """The momentum changes by more than a hundred roundings of float32."""
     mass, velocity = scenario.scene.mass[:, None], played.velocity
     momentum = (mass * velocity).sum(axis=1)
     whole = laws.lengths(mass * velocity[0]).sum()
@@ -122,7 +119,6 @@ def momentum_drifts(scenario: Scenario, played: Trajectory) -> Verdict:
 
 
 def gas_diverges(scenario: Scenario, played: Trajectory) -> Verdict:
-    """The disks of the two runs are at different positions."""
     off = laws.lengths(played.position - truth_of(scenario).position) / scenario.scene.radius
     disk = int(np.argmax(off[-1]))
     event = f"disk {disk} is at another position"
@@ -130,19 +126,16 @@ def gas_diverges(scenario: Scenario, played: Trajectory) -> Verdict:
 
 
 def in_blocks(series: Array) -> Array:
-    """(`BLOCKS`, ...) means of a series (k, ...) over blocks of equal length, without the first
-    tenth."""
+    # means over blocks of equal length, without the first tenth
     settled = series[len(series) // 10 :]
     return np.array([block.mean(axis=0) for block in np.array_split(settled, BLOCKS)])
 
 
 def block_error(blocks: Array) -> float:
-    """The standard error of the mean of (`BLOCKS`,)."""
     return float(blocks.std(ddof=1)) / sqrt(len(blocks))
 
 
 def temperatures_part(scenario: Scenario, played: Trajectory) -> Verdict:
-    """The temperatures of light and heavy disks differ by half a doubling plus 4 block errors."""
     mass = scenario.scene.mass
     kinetic = mass * (played.velocity**2).sum(axis=2) / 2
     light, heavy = (kinetic[:, mass == kind].mean(axis=1) for kind in (mass.min(), mass.max()))
@@ -154,8 +147,6 @@ def temperatures_part(scenario: Scenario, played: Trajectory) -> Verdict:
 
 
 def wrong_gas(scenario: Scenario, played: Trajectory) -> Verdict:
-    """The speeds, collision rate or wall pressure differ from Maxwell, Enskog or the virial series
-    by 5 % plus 4 block errors."""
     collisions, at = played.collisions, float(played.t[len(played) // 10])
     expected, shares = literature(scenario), in_blocks(shares_of_speeds(played))
     words = ("the slowest", *("those between",) * (RANGES - 2), "the fastest")
@@ -175,7 +166,6 @@ def wrong_gas(scenario: Scenario, played: Trajectory) -> Verdict:
 
 
 def literature(scenario: Scenario) -> Gas:
-    """The `Gas` of the literature for the scenario's equal disks, at their initial temperature."""
     scene = scenario.scene
     size = scene.walls.max(axis=(0, 1)) - scene.walls.min(axis=(0, 1))
     temperature = float(scene.mass[0] * (scene.velocity**2).sum() / 2 / scene.n)
@@ -183,8 +173,7 @@ def literature(scenario: Scenario) -> Gas:
 
 
 def counted(played: Trajectory, which: NDArray[np.bool_], weights: Array) -> Array:
-    """(`BLOCKS`,) sums of the weights of some collisions, per second, in blocks after the first
-    tenth."""
+    # sums of the weights of some collisions, per second, in blocks after the first tenth
     edges = np.linspace(0.1 * played.t[-1], played.t[-1], BLOCKS + 1)
     sums, _ = np.histogram(played.collisions.t[which], edges, weights=weights[which])
     return sums / np.diff(edges)
@@ -213,8 +202,31 @@ def shares_of_speeds(played: Trajectory) -> Array:
     return shares
 
 
-ENERGY_DRIFTS = Predicate("energy drifts", "of the energy", 0.01, energy_drifts)
-MOMENTUM_DRIFTS = Predicate("momentum drifts", "of all momenta", MOST_MOMENTUM, momentum_drifts)
-GAS_DIVERGES = Predicate("diverges", "radii", 1e-3, gas_diverges)
-TEMPERATURES_PART = Predicate("temperatures part", "doublings", 0.5, temperatures_part)
-WRONG_GAS = Predicate("wrong gas", "of the bound", 1.0, wrong_gas)
+ENERGY_DRIFTS = Predicate(
+    "energy drifts", "the energy changes at e = 1", "of the energy", 0.01, energy_drifts
+)
+MOMENTUM_DRIFTS = Predicate(
+    "momentum drifts",
+    "the momentum changes by more than a hundred roundings of float32",
+    "of all momenta",
+    MOST_MOMENTUM,
+    momentum_drifts,
+)
+GAS_DIVERGES = Predicate(
+    "diverges", "the disks of the two runs are at different positions", "radii", 1e-3, gas_diverges
+)
+TEMPERATURES_PART = Predicate(
+    "temperatures part",
+    "the temperatures of light and heavy disks differ by half a doubling plus 4 block errors",
+    "doublings",
+    0.5,
+    temperatures_part,
+)
+WRONG_GAS = Predicate(
+    "wrong gas",
+    "the speeds, collision rate or wall pressure differ from Maxwell, Enskog or the virial series"
+    " by 5 % plus 4 block errors",
+    "of the bound",
+    1.0,
+    wrong_gas,
+)

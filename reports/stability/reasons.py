@@ -21,11 +21,9 @@ from crosscheck2d.reports.stability.limits import NEVER_FAILS, Limit
 
 
 class Law(NamedTuple):
-    """What happens, where that stands, and the mechanism that it is about, of adapters/mechanisms,
-    or `LATE`; an ablation that has the limit must have it."""
-
-    text: str
+    text: str  # what happens
     source: str
+    # of adapters/mechanisms, or `LATE`: an ablation that has the limit must have it
     mechanism: str = ""
 
 
@@ -215,7 +213,6 @@ LAWS = {
         "warm starting: a step begins with the impulses of the last one; contact caches",
     ),
 }
-"""Id -> what happens."""
 
 
 class Reason(NamedTuple):
@@ -236,7 +233,6 @@ class Reason(NamedTuple):
     variant: str = ""
 
     def fits(self, limit: Limit) -> bool:
-        """Whether the row is about this case and this engine."""
         pairs = (limit.case, self.cases), (limit.engine, self.engines)
         return all(any(fnmatch(name, p) for p in patterns.split()) for name, patterns in pairs)
 

@@ -1,18 +1,16 @@
-"""Carries out the stability report: every case on every engine, a row for each as it
-ends, the replay of its failing run, and the table of limits."""
+"""Carries out the stability report: every case on every engine, a row for each as it ends, and the
+replay of its failing run."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import closing, suppress
-from dataclasses import asdict, astuple, dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from math import nan
 from typing import Any, NamedTuple
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
@@ -21,37 +19,30 @@ from crosscheck2d.adapters.engines import ENGINES, FETCHED, OWN, parsed
 from crosscheck2d.adapters.npm_packages import version_of
 from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.page.replay import COLLISIONS, pack_layers, ratio_of
-from crosscheck2d.reports.run.cells import content_key, source_hash
-from crosscheck2d.reports.run.machine import about
+from crosscheck2d.reports.run.cells import about, content_key, source_hash
 from crosscheck2d.reports.run.made import digest_of
+from crosscheck2d.reports.run.playing import STATE
 from crosscheck2d.reports.run.pool import Failure, run_all
 from crosscheck2d.reports.run.store import Store
-from crosscheck2d.reports.run.trajectories import STATE
-from crosscheck2d.reports.stability.cases import CASES
+from crosscheck2d.reports.stability.cases import CASES, case_named
 from crosscheck2d.reports.stability.explain import explained, with_replays
 from crosscheck2d.reports.stability.limits import (
     FORMS,
     FULL,
     NEVER_WORKS,
-    Case,
+    WITH_FRICTION_ONLY,
     Limit,
     LimitSearch,
     Trial,
     engines_of,
+    taking_part,
 )
 from crosscheck2d.reports.stability.tables import MAPS, TOUCHING, LawOf, MapOf, law_of, map_of
-from crosscheck2d.reports.stability.variants import WITH_FRICTION_ONLY, taking_part
-from crosscheck2d.reports.stability.vary import case_of_file
 from crosscheck2d.reports.terminal.counts import counted
 from crosscheck2d.reports.terminal.progress import Progress
 from crosscheck2d.scenarios.model import Collisions, Scenario, Trajectory, frozen
 from crosscheck2d.scenarios.no_truth import NoTruth
 
-COLUMNS = (
-    *("engine", "profile", "case", "parameter", "works_at", "fails_at", "unit", "predicate"),
-    *("seeds", "reason", "verdict", "failed_fraction", "runs", "monotone", "spacing", "tested"),
-    *("source", "event", "form", "cause"),
-)
 SOURCE = ("reports/stability/**/*.py", "reports/compare/**/*.py", "scenarios/**/*.py")
 HEADER = "stability", "plan"  # kind and key of the row with what was asked for
 # s of processor time that a search takes in the quick form, the mean of all engines (1200 searches
@@ -77,12 +68,43 @@ LONGEST = ("long_gas", "long_wrapped_gas")
 BEFORE, AFTER = 120, 40  # samples of a failure that are shown
 REPLAY = 5.0  # s that a replay lasts
 Result = Limit | MapOf | LawOf
+# kind of a row -> the type of its value
 RESULTS: dict[str, TypeAdapter[Any]] = {
     "limit": TypeAdapter(Limit),
     "map": TypeAdapter(MapOf),
     "law": TypeAdapter(LawOf),
 }
-"""Kind of a row -> the type of its value."""
+
+
+class Task(NamedTuple):
+    """A case, a map or a scene of touching disks on one engine; tasks do not depend on each
+    other."""
+
+    name: str
+    engine: str
+    form: str
+
+    @property
+    def kind(self) -> str:
+        return "map" if self.name in MAPS else "law" if self.name in TOUCHING else "limit"
+
+    def run(self, added: Mapping[str, EngineRow]) -> Result:
+        # in the worker, which does not have the rows that the plan adds
+        with taking_part(added):
+            if self.kind != "limit":
+                return (map_of if self.kind == "map" else law_of)(self.name, self.engine)
+            search = LimitSearch(case_named(self.name), self.engine, FORMS[self.form])
+            return with_replay(search, with_replays(search, search.limit()))
+
+    def lost(self, failure: Failure) -> Result:
+        """The result where the worker died or was stopped."""
+        if self.kind != "limit":
+            return (MapOf if self.kind == "map" else LawOf)(
+                self.name, self.engine, (), status=failure.status
+            )
+        event = f"{failure.status}: {failure.reason}"
+        trials = (Trial(nan, 1, 1, nan, 0, nan, event, failure.status),)
+        return Limit(*self, NEVER_WORKS, nan, nan, trials, status=failure.status)
 
 
 @dataclass(frozen=True)
@@ -98,8 +120,7 @@ class StabilityPlan:
 
     @property
     def added(self) -> dict[str, EngineRow]:
-        """The rows of engines' own files, `PATH:own`, of `FETCHED` and of other versions, among
-        `engines`."""
+        # engines' own files, fetched packages and other versions
         return {
             name: ENGINES[name]
             for name in self.engines
@@ -108,7 +129,6 @@ class StabilityPlan:
 
     @property
     def versions(self) -> dict[str, str]:
-        """What decides the numbers, npm packages too."""
         packages = dict.fromkeys(row.package for row in self.added.values() if row.package)
         return {**about("", 0)["versions"], **{name: version_of(name) for name in packages}}
 
@@ -120,7 +140,7 @@ class StabilityPlan:
         return content_key(*what, row.source if row else "", source_hash(SOURCE))
 
     def tasks(self) -> list[Task]:
-        """All tasks, the slowest first, so that no long one is left at the end."""
+        # the slowest first, so that no long one is left at the end
         smooth = [name for name in self.engines if name not in WITH_FRICTION_ONLY]
         tasks = []
         for name in self.names:
@@ -136,55 +156,23 @@ class StabilityPlan:
         )
 
     def done_before(self, store: Store) -> set[Task]:
-        """The tasks that have a row and ended well."""
         rows = {task: store.get(task.kind, self.key(task)) for task in self.tasks()}
         return {task for task, row in rows.items() if row and row.value["status"] == "ok"}
 
     def carry_out(self, store: Store, progress: Progress) -> None:
-        """Do every task that has no row yet, and write the row of each as it ends."""
         keys, done = {task: self.key(task) for task in self.tasks()}, self.done_before(store)
         header = about(self.command, 0) | {"versions": self.versions, "form": self.form}
-        store.put(*HEADER, header | {"tasks": [(key, astuple(task)) for task, key in keys.items()]})
+        store.put(*HEADER, header | {"tasks": [(key, task) for task, key in keys.items()]})
         work: dict[Any, Callable[[], Any]] = {
-            task: partial(task, self.added) for task in keys if task not in done
+            task: partial(task.run, self.added) for task in keys if task not in done
         }
         progress.start(len(work), len(keys))
         with closing(run_all(work, self.workers, FORMS[self.form].timeout)) as results:
             for task, result in results:
                 reason = result.reason if isinstance(result, Failure) else ""
-                row = failed(task, result) if isinstance(result, Failure) else result
+                row = task.lost(result) if isinstance(result, Failure) else result
                 store.put(task.kind, keys[task], asdict(row))
                 progress.done(f"{task.name}  {task.engine}", row.status, reason)
-
-
-@dataclass(frozen=True)
-class Task:
-    """A case, a map or a scene of touching disks on one engine; tasks do not depend on each
-    other."""
-
-    name: str
-    engine: str
-    form: str
-
-    @property
-    def kind(self) -> str:
-        """Of its row."""
-        return "map" if self.name in MAPS else "law" if self.name in TOUCHING else "limit"
-
-    def __call__(self, added: Mapping[str, EngineRow]) -> Result:
-        """In the worker: do it, with the rows that the plan adds among the others. A limit comes
-        with its cause and its replay."""
-        with taking_part(added):
-            if self.kind != "limit":
-                return (map_of if self.kind == "map" else law_of)(self.name, self.engine)
-            search = LimitSearch(case_named(self.name), self.engine, FORMS[self.form])
-            limit = replace(search.limit(), case=self.name)
-            return with_failure(search, with_replays(search, limit))
-
-
-def case_named(name: str) -> Case:
-    """A case of the table, or of a scene file: FILE.toml:vary."""
-    return CASES[name] if name in CASES else case_of_file(*name.rsplit(":", 1))
 
 
 def expected(tasks: Collection[Task], workers: int) -> str:
@@ -207,22 +195,10 @@ def expected(tasks: Collection[Task], workers: int) -> str:
     )
 
 
-def failed(task: Task, failure: Failure) -> Result:
-    """The result of a task whose worker died or was stopped."""
-    if task.kind != "limit":
-        return (MapOf if task.kind == "map" else LawOf)(
-            task.name, task.engine, (), status=failure.status
-        )
-    event = f"{failure.status}: {failure.reason}"
-    trials = (Trial(nan, 1, 1, nan, 0, nan, event, failure.status),)
-    names = task.name, task.engine, task.form
-    return Limit(*names, NEVER_WORKS, nan, nan, trials, status=failure.status)
-
-
-def with_failure(search: LimitSearch, limit: Limit) -> Limit:
+def with_replay(search: LimitSearch, limit: Limit) -> Limit:
     """The limit with the replay of its first failing run, from a tenth of the shown time before the
     failure, and the trajectory that is shown with it, if there is one."""
-    failing, failure = limit.failing, search.failure(limit)
+    failing, failure = limit.failing, search.seen.get(limit.fails_at)
     if failing is None or failure is None or failure[1].trajectory is None:
         return limit
     scenario, run = failure
@@ -254,10 +230,10 @@ def near(failing: Trial, scenario: Scenario) -> NDArray[np.int64]:
     return np.arange(first, min(scenario.intervals, first + BEFORE + AFTER) + 1)
 
 
-def part_of(whole: Trajectory, shown: NDArray[np.int64], scenario: Scenario) -> Trajectory:
-    """A trajectory at those of the samples `shown` that it has, and the collisions between them,
-    if they are few enough to show."""
-    first, last = shown[0], shown[-1]
+def part_of(whole: Trajectory, samples: NDArray[np.int64], scenario: Scenario) -> Trajectory:
+    """A trajectory at those of the samples that it has, and the collisions between them, if they
+    are few enough to show."""
+    first, last = samples[0], samples[-1]
     state: dict[str, Any] = {n: frozen(getattr(whole, n)[first : last + 1]) for n in ("t", *STATE)}
     collisions = whole.collisions
     low, high = (k * scenario.sample_interval for k in (first - 0.5, last + 0.5))
@@ -268,8 +244,7 @@ def part_of(whole: Trajectory, shown: NDArray[np.int64], scenario: Scenario) -> 
 
 
 class StabilityResults(NamedTuple):
-    """All that was found, in reading order: the limits with their reasons, the maps, the laws of
-    touching disks, and the header."""
+    """In reading order; the limits have their reasons."""
 
     limits: list[Limit]
     maps: list[MapOf]
@@ -278,67 +253,22 @@ class StabilityResults(NamedTuple):
 
     @property
     def all(self) -> list[Result]:
-        """The result of every task."""
         return [*self.limits, *self.maps, *self.laws]
 
 
-def read(store: Store) -> StabilityResults:
-    """The stability report in a folder."""
+def read_results(store: Store) -> StabilityResults:
     plan = store.get(*HEADER)
     assert plan is not None
     names = {name: k for k, name in enumerate([*CASES, *MAPS, *TOUCHING])}
     engines = list(dict.fromkeys(e for case in CASES.values() for e in engines_of(case, ENGINES)))
-    tasks = [(Task(*task), key) for key, task in plan.value["tasks"]]
-    tasks.sort(
-        key=lambda pair: (
-            names.get(pair[0].name, len(names)),
-            pair[0].name,
-            engines.index(pair[0].engine),
-        )
-    )
+
+    def order(pair: tuple[Task, str]) -> tuple[int, str, int]:
+        task = pair[0]
+        return names.get(task.name, len(names)), task.name, engines.index(task.engine)
+
     results: dict[str, list[Any]] = {kind: [] for kind in RESULTS}
-    for task, key in tasks:
+    for task, key in sorted(((Task(*task), key) for key, task in plan.value["tasks"]), key=order):
         if row := store.get(task.kind, key):
             results[task.kind].append(RESULTS[task.kind].validate_python(row.value))
     limits, maps, laws = results.values()
     return StabilityResults(explained(limits), maps, laws, plan.value)
-
-
-def table(limits: Sequence[Limit]) -> pd.DataFrame:
-    """A row for each limit, with the columns `COLUMNS`."""
-    return pd.DataFrame([row_of(limit) for limit in limits], columns=list(COLUMNS))
-
-
-def row_of(limit: Limit) -> dict[str, Any]:
-    """The limit as a row of limits.csv."""
-    case = case_named(limit.case)
-    failing = limit.failing if limit.status == "ok" else limit.trials[0]
-    engine, profile = limit.engine.split(":")
-    cause = limit.cause
-    return {
-        "engine": engine,
-        "profile": profile,
-        "case": limit.case,
-        "parameter": case.parameter,
-        "works_at": shortened(limit.works_at),
-        "fails_at": shortened(limit.fails_at),
-        "unit": case.unit,
-        "predicate": failing.broken if failing else case.predicate.name,
-        "seeds": max(trial.runs for trial in limit.trials),
-        "reason": cause.sentence if cause else "",
-        "verdict": limit.verdict,
-        "failed_fraction": failing.failed / failing.runs if failing else 0.0,
-        "runs": limit.runs,
-        "monotone": limit.monotone,
-        "spacing": shortened(limit.spacing),
-        "tested": cause.shown if cause else "",
-        "source": cause.source if cause else "",
-        "event": failing.event if failing else "",
-        "form": limit.form,
-        "cause": str(cause.kind) if cause else "",
-    }
-
-
-def shortened(value: float) -> float:
-    """The number with six significant digits; no bracket is narrower."""
-    return value if math.isnan(value) else float(f"{value:.6g}")

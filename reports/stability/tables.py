@@ -19,8 +19,9 @@ import numpy as np
 from crosscheck2d.adapters.engines import ENGINES, changed
 from crosscheck2d.adapters.play import play_once
 from crosscheck2d.adapters.run import Run
-from crosscheck2d.reports.stability.cases_gas import gas
-from crosscheck2d.reports.stability.cases_stacks import column
+from crosscheck2d.reports.stability.cases_few import LEAD, RADIUS, disks, flyby
+from crosscheck2d.reports.stability.cases_many import column, gas
+from crosscheck2d.reports.stability.limits import play_as
 from crosscheck2d.reports.stability.predicates import (
     REFUSED,
     RESTITUTION_OFF,
@@ -29,8 +30,6 @@ from crosscheck2d.reports.stability.predicates import (
     judge,
 )
 from crosscheck2d.reports.stability.predicates_gas import ENERGY_DRIFTS
-from crosscheck2d.reports.stability.scenes import LEAD, RADIUS, disks, flyby
-from crosscheck2d.reports.stability.variants import play_as
 from crosscheck2d.scenarios.model import Array, Scenario
 from crosscheck2d.scenarios.truth.exact import with_oracle
 
@@ -63,17 +62,14 @@ class Map(NamedTuple):
 
 @dataclass(frozen=True)
 class MapOf:
-    """A map on one engine: rows (x, y, worst reading, whether a run failed, the id of its verdict,
-    what happened)."""
-
     name: str
     engine: str
+    # x, y, worst reading, whether a run failed, the id of its verdict, what happened
     cells: tuple[tuple[float, float, float, bool, str, str], ...]
     status: str = "ok"
 
 
 def map_of(name: str, engine: str) -> MapOf:
-    """Play a map's grid on an engine."""
     grid, cells = MAPS[name], []
     for x, y in product(grid.x, grid.y):
         scenarios = [grid.scene(x, y, run) for run in range(grid.runs)]
@@ -85,7 +81,6 @@ def map_of(name: str, engine: str) -> MapOf:
 
 
 def with_iterations(engine: str, scenario: Scenario, count: float) -> Run:
-    """Play with this many iterations, or substeps if the engine has those instead."""
     work = ENGINES[engine].work
     assert work is not None
     make = partial(changed, engine, **{work.setting: int(count)})
@@ -158,25 +153,16 @@ class Touching(NamedTuple):
 
 
 class AtGap(NamedTuple):
-    """The result of an engine at one gap, in radii.
-
-    law: the nearest one, "none" if all are farther off than `NEAR`; off: the distance to it.
-    momentum: its change, over the initial momentum. energy: over the initial energy. velocity: of
-    the disks, over the incoming speed.
-    """
-
-    gap: float
-    law: str
-    off: float = nan
-    momentum: float = nan
-    energy: float = nan
-    velocity: tuple[tuple[float, float], ...] = ()
+    gap: float  # radii
+    law: str  # the nearest, "none" if all are farther off than `NEAR`
+    off: float = nan  # from that law, over the incoming speed
+    momentum: float = nan  # its change, over the initial momentum
+    energy: float = nan  # over the initial energy
+    velocity: tuple[tuple[float, float], ...] = ()  # of the disks, over the incoming speed
 
 
 @dataclass(frozen=True)
 class LawOf:
-    """The result of an engine at every gap."""
-
     name: str
     engine: str
     gaps: tuple[AtGap, ...]
@@ -184,7 +170,6 @@ class LawOf:
 
 
 def cradle(n: int) -> Touching:
-    """A disk strikes a row of n - 1 disks."""
     row = np.stack([2.0 * np.arange(n) - 2, np.zeros(n)], axis=-1)
     apart = np.stack([np.maximum(0.0, np.arange(n) - 1), np.zeros(n)], axis=-1)
     last, together = np.zeros((n, 2)), np.zeros((n, 2))
@@ -238,7 +223,6 @@ def answers(name: str, gap: float) -> Laws:
 
 
 def law_of(name: str, engine: str, gaps: tuple[float, ...] = GAPS) -> LawOf:
-    """Play a scene at every gap, and compare with every law."""
     results = []
     for gap in gaps:
         run = play_as(engine, scene_of(TOUCHING[name], gap))
@@ -251,7 +235,6 @@ def law_of(name: str, engine: str, gaps: tuple[float, ...] = GAPS) -> LawOf:
 
 
 def named(velocity: Array, gap: float, laws: Laws) -> AtGap:
-    """The law whose velocities are nearest to these (n, 2), in units of the incoming speed."""
     off = {law: min(np.abs(velocity - v).max() for v in vs) for law, vs in laws.items()}
     nearest = min(off, key=lambda law: float(off[law]))
     momentum = float(np.linalg.norm(velocity.sum(axis=0) - [1, 0]))

@@ -1,8 +1,9 @@
-"""How a command ends: its exit status, its messages on standard error, and its reaction to
-signals."""
+"""How a command prints and ends: its exit status, its messages on standard error, streams that may
+be closed or full, and signals."""
 
 from __future__ import annotations
 
+import io
 import os
 import shutil
 import signal
@@ -10,8 +11,9 @@ import sys
 import textwrap
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from errno import EPIPE
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from crosscheck2d.reports.terminal.foreign_text import legible
 
@@ -27,34 +29,30 @@ class Unusable(ValueError):
     """A file of a run does not fit the others; says which, why, and what to do."""
 
 
-class Signals:
-    """The handler of Ctrl-C and of SIGTERM, with which a batch system or a shutdown ends a command:
-    both raise `KeyboardInterrupt`. `status`: the exit status of the first that came, or 0."""
+_status = DONE  # the exit status of the first signal that came
 
-    def __init__(self) -> None:
-        self.status = DONE
 
-    def __call__(self, number: int, _: object) -> NoReturn:
-        """Stop the command."""
-        self.status = self.status or STATUS[signal.Signals(number)]
-        raise KeyboardInterrupt
+def stop(number: int, _: object) -> NoReturn:
+    """The handler of Ctrl-C and of SIGTERM, with which a batch system or a shutdown ends a
+    command."""
+    global _status
+    _status = _status or STATUS[signal.Signals(number)]
+    raise KeyboardInterrupt
 
 
 def signal_status() -> int:
     """The exit status of the signal that stops this command; 0 if none has come."""
-    handler = signal.getsignal(signal.SIGTERM)
-    return handler.status if isinstance(handler, Signals) else DONE
+    return _status
 
 
 @contextmanager
 def ends_on_signals() -> Iterator[None]:
     """Context of a whole command: a signal ends it with status 130 or 143, without waiting for
     threads. An ignored signal stays ignored, as in a shell's background job."""
-    signals = Signals()
     before = {number: signal.getsignal(number) for number in STATUS}
     for number in STATUS:
         if before[number] is not signal.SIG_IGN:
-            signal.signal(number, signals)
+            signal.signal(number, stop)
     status: str | int | None = DONE
     try:
         yield
@@ -64,14 +62,14 @@ def ends_on_signals() -> Iterator[None]:
         status = INTERRUPTED
     finally:
         for number, handler in before.items():
-            signal.signal(number, signal.SIG_IGN if signals.status else handler)
-    if not signals.status:
+            signal.signal(number, signal.SIG_IGN if _status else handler)
+    if not _status:
         sys.exit(status)
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError, ValueError):
             stream.flush()
     # Typer makes 130 of any KeyboardInterrupt.
-    os._exit(signals.status if status == INTERRUPTED or not isinstance(status, int) else status)
+    os._exit(_status if status == INTERRUPTED or not isinstance(status, int) else status)
 
 
 @contextmanager
@@ -98,22 +96,72 @@ def keeping(out: Path, kept: Callable[[], str]) -> Iterator[None]:
         sys.exit(BAD_INPUT)
 
 
-def refuse(faults: Sequence[str]) -> NoReturn:
+class Outlet(io.FileIO):
+    """A file descriptor whose writes never fail: after the first `fault` data is dropped, so that
+    the work goes on."""
+
+    fault: OSError | None = None
+
+    def write(self, data: Any) -> int | None:  # type: ignore[override]
+        if self.fault is None:
+            try:
+                return super().write(data)
+            except OSError as fault:
+                self.fault = fault
+        return memoryview(data).nbytes
+
+
+@contextmanager
+def printing() -> Iterator[None]:
+    """Context in which printing cannot end a command: characters that a stream lacks are escaped.
+
+    Exits 1 with a message if standard output failed; a failure of standard error cannot be
+    reported.
+    """
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:  # closed: else the next file would get its number, and be printed into
+            os.set_inheritable(os.open(os.devnull, os.O_RDONLY), True)
+    outlets = []
+    for number, name in ((1, "stdout"), (2, "stderr")):
+        before, outlet = getattr(sys, name), Outlet(number, "w", closefd=False)
+        stream = io.TextIOWrapper(
+            io.BufferedWriter(outlet),
+            encoding=before.encoding if before is not None else "utf-8",
+            errors="backslashreplace",
+            line_buffering=number == 2 or outlet.isatty(),
+        )
+        setattr(sys, name, stream)
+        outlets.append(outlet)
+    try:
+        yield
+    except SystemExit as end:
+        sys.stdout.flush()
+        fault = outlets[0].fault
+        if fault is None or fault.errno == EPIPE:  # as of `crosscheck list | head`
+            raise
+        say(
+            f"cannot write to standard output: {fault.strerror}; not all was printed, but every"
+            " file is written"
+        )
+        sys.exit(FAILED if end.code in (None, DONE) else end.code)
+
+
+def refuse(faults: str | Sequence[str]) -> NoReturn:
     """Print the faults, one line each, and exit 2."""
-    for fault in faults:
+    for fault in [faults] if isinstance(faults, str) else faults:
         say(fault)
     sys.exit(BAD_INPUT)
 
 
 def say(line: str) -> None:
-    """One line on standard error; on a terminal it is folded between words."""
+    """One line on standard error. On a terminal it is folded between words; a longer word, as a
+    path, stays whole."""
     text = legible(line)
     if sys.stderr.isatty():
-        width = shutil.get_terminal_size().columns
-        text = "\n".join(folded(part, width) for part in text.split("\n"))
+        fold = textwrap.TextWrapper(
+            shutil.get_terminal_size().columns, break_long_words=False, break_on_hyphens=False
+        )
+        text = "\n".join(map(fold.fill, text.split("\n")))
     print(text, file=sys.stderr)
-
-
-def folded(line: str, width: int) -> str:
-    """The line in lines of at most so many columns; a longer word, as a path, stays whole."""
-    return textwrap.fill(line, width, break_long_words=False, break_on_hyphens=False)

@@ -5,10 +5,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import BinaryIO
 
 from crosscheck2d.adapters.host.file import printable
 
@@ -31,28 +28,21 @@ def encoded(text: str) -> bytes:
 
 
 def put_text(path: Path, text: str) -> None:
-    """Write a file, `encoded`, atomically; raises `OSError`."""
-    put_bytes(path, encoded(text))
-
-
-def put_bytes(path: Path, data: bytes) -> None:
-    """Write a file as `whole` does; a pipe or a device is written to directly. Raises `OSError`."""
+    """Write a file, `encoded`, whole or not at all; a pipe or a device is written to directly.
+    Raises `OSError`."""
     # tested before links are resolved: /dev/stdout resolves to no path
     if path.exists() and not path.is_file():
-        path.write_bytes(data)
-        return
-    with whole(path.resolve()) as file:
-        file.write(data)
+        path.write_bytes(encoded(text))
+    else:
+        put_whole(path.resolve(), encoded(text))
 
 
-@contextmanager
-def whole(path: Path) -> Iterator[BinaryIO]:
-    """Context with a file to write to, which replaces `path` when it is complete; raises
-    `OSError`."""
+def put_whole(path: Path, data: bytes) -> None:
+    """Write a file, which replaces `path` when it is complete; raises `OSError`."""
     part = path.with_name(f".crosscheck-{os.getpid()}.part")
     try:
         with part.open("xb") as file:
-            yield file
+            file.write(data)
         part.replace(path)
     except BaseException:
         part.unlink(missing_ok=True)

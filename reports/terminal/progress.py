@@ -16,64 +16,35 @@ from crosscheck2d.reports.terminal.console import Console
 from crosscheck2d.reports.terminal.foreign_text import legible
 
 QUIET = 30.0  # s between two lines if there is no terminal
-BAR, GAP = 10, 2  # columns
-LEAST = 24  # columns for the description, before anything else is left out
+BAR, WIDE = 10, 80  # columns of the bar; and of a terminal that has room for it
 
 
 class OneLine(ProgressColumn):
-    """Description, progress and times in one line of any width.
-
-    Parts that do not fit are left out, the least important first; a number is never cut.
-    """
+    """What runs, a bar, and numbers, in one line; words that do not fit are left out."""
 
     def __init__(self, console: Console) -> None:
         super().__init__()
         self.console = console
 
     def render(self, task: Task) -> Table:
-        """The line of a task."""
-        parts, width = parts_of(task), self.console.width
-        # left out: the bar first, then the last number; the first two always stay
-        while room_beside(parts, width) < LEAST and len(parts) > 2:
-            parts.pop(0 if isinstance(parts[0], ProgressBar) else -1)
+        numbers, bar, width = clock(task.elapsed), list[ProgressBar](), self.console.width
+        if task.total and not task.finished:
+            count = f"{task.completed:.0f}/{task.total:.0f}  {clock(task.time_remaining)} left"
+            numbers = "  ".join(filter(None, (count, task.fields["each"], numbers)))
+            if width >= WIDE:
+                bar = [ProgressBar(total=task.total, completed=task.completed, width=BAR)]
+        room = width - len(numbers) - (BAR + 4 if bar else 2)
         what = legible(task.description).replace("\n", " ")
-        line = Table.grid(padding=(0, GAP, 0, 0))
-        line.add_row(Text(fitted(what, room_beside(parts, width))), *parts)
+        if len(what) > room:
+            what = what[: max(room, 0) + 1].rpartition(" ")[0].rstrip()
+        line = Table.grid(padding=(0, 2, 0, 0))
+        line.add_row(Text(what), *bar, Text(numbers, "progress.remaining"))
         return line
-
-
-def parts_of(task: Task) -> list[ProgressBar | Text]:
-    """The bar, the number done, the time left, the time per task, the time so far."""
-    elapsed = Text(clock(task.elapsed), "progress.elapsed")
-    if not task.total or task.finished:
-        return [elapsed]
-    return [
-        ProgressBar(total=task.total, completed=task.completed, width=BAR),
-        Text(f"{task.completed:.0f}/{task.total:.0f}", "progress.download"),
-        Text(f"{clock(task.time_remaining)} left", "progress.remaining"),
-        Text(task.fields["each"]),
-        elapsed,
-    ]
-
-
-def room_beside(parts: list[ProgressBar | Text], width: int) -> int:
-    """Columns of `width` left beside these parts."""
-    widths = (BAR if isinstance(part, ProgressBar) else part.cell_len for part in parts)
-    return width - sum(each + GAP for each in widths)
 
 
 def clock(seconds: float | None) -> str:
     """A time as 0:01:05; -:--:-- if it is not known yet."""
     return "-:--:--" if seconds is None else str(timedelta(seconds=int(seconds)))
-
-
-def fitted(what: str, room: int) -> str:
-    """As many words of `what` as fit; if the first word does not fit, its beginning."""
-    if len(what) <= room:
-        return what
-    kept = what[: room + 1]
-    words = kept if kept.endswith(" ") else kept.rpartition(" ")[0]
-    return words.rstrip() or what[: max(room - 1, 0)] + "…"
 
 
 class Progress:
@@ -105,13 +76,11 @@ class Progress:
         self.task = self.bar.add_task(what, total=total, completed=completed, each="")
 
     def say(self, what: str) -> None:
-        """Set the description."""
         if self.bar.finished:
             self.begin(what)
         self.bar.update(self.task, description=what)
 
     def note(self, sentence: str) -> None:
-        """Print a line that stays."""
         self.bar.console.print(sentence, highlight=False)
 
     def start(self, missing: int, total: int, what: str = "") -> None:
@@ -137,5 +106,4 @@ class Progress:
 
     @property
     def seconds(self) -> float:
-        """Since the start."""
         return perf_counter() - self.began

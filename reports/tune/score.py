@@ -89,7 +89,6 @@ class Against(NamedTuple):
 
     @property
     def mends(self) -> bool:
-        """Whether more runs get better than come and go."""
         return self.harmed < -MOST_OF_ALL * self.runs
 
 
@@ -104,7 +103,6 @@ def posed(families: tuple[str, ...], seeds: tuple[int, ...]) -> tuple[Asked, ...
 
 
 def measured(make: Make, scenes: Sequence[Asked]) -> TrialScores:
-    """Play every scene at every step size."""
     runs = [[of_run(make, scene, truth, k) for k in LADDER] for scene, truth in scenes]
     error = [[error for error, _ in row] for row in runs]
     return TrialScores(np.array(error), np.array([[harm for _, harm in row] for row in runs]))
@@ -113,7 +111,6 @@ def measured(make: Make, scenes: Sequence[Asked]) -> TrialScores:
 def of_run(
     make: Make, scenario: Scenario, truth: Trajectory | None, substeps: int
 ) -> tuple[float, list[float]]:
-    """Error, and harms; see `TrialScores`."""
     dt, scene = scenario.dt(substeps), scenario.scene
     run = play_once(make, "tuned:engine", scenario, dt)
     harm = dict.fromkeys(HARMS, 0.0)
@@ -185,27 +182,24 @@ def faults_of(now: TrialScores, before: TrialScores, scenes: Sequence[Asked]) ->
     """The families that get worse beyond the bounds; [] if no bound is broken."""
     family = np.array([scene.name.rsplit("-", 1)[0] for scene, _ in scenes])
     change, faults = changes(now, before), []
-    lost = increases(now.harm, before.harm)[:, :, HARMS.index(FAILED)]
+    increased = increases(now.harm, before.harm)
+    lost = increased[:, :, HARMS.index(FAILED)]
     many = change.sum() > MOST_OF_ALL * change.size
     for name in dict.fromkeys(family.tolist()):
         its = np.flatnonzero(family == name)
         worse, runs = int(change[its].sum()), change[its].size
         if lost[its].any() or worse >= MOST_OF_A_FAMILY * runs or (many and worse > 0):
-            text = worst(now, before, scenes, its)
-            faults.append(f"{name}: {worse} of {runs} runs worse, {text}")
+            # the harm that increases most: scene, dt, number
+            more = np.where(increased[its], now.harm[its] - before.harm[its], 0.0)
+            s, k, h = np.unravel_index(int(np.argmax(more)), more.shape)
+            scene, _ = scenes[its[s]]
+            unit = "times its bound" if HARMS[h] in VERDICTS else "in the run"
+            has, had = (f"{scores.harm[its[s], k, h]:.2g}" for scores in (now, before))
+            faults.append(
+                f"{name}: {worse} of {runs} runs worse, {scene.name} at"
+                f" {1e3 * scene.dt(LADDER[k]):.3g} ms: {HARMS[h]} {has} {unit}, not {had}"
+            )
     return faults
-
-
-def worst(
-    now: TrialScores, before: TrialScores, scenes: Sequence[Asked], its: NDArray[np.int64]
-) -> str:
-    """Of the harms that increase in these scenes the one that does most: scene, dt, number."""
-    more = np.where(increases(now.harm, before.harm)[its], now.harm[its] - before.harm[its], 0.0)
-    s, k, h = np.unravel_index(int(np.argmax(more)), more.shape)
-    scene, _ = scenes[its[s]]
-    unit = "times its bound" if HARMS[h] in VERDICTS else "in the run"
-    has, had = (f"{scores.harm[its[s], k, h]:.2g}" for scores in (now, before))
-    return f"{scene.name} at {1e3 * scene.dt(LADDER[k]):.3g} ms: {HARMS[h]} {has} {unit}, not {had}"
 
 
 def cost_of(make: Make, than: Make, scenes: Sequence[Asked]) -> float:

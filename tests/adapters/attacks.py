@@ -211,6 +211,11 @@ FORGED: dict[str, tuple[str, str]] = {
     "deep JSON": ("WRITE(b'[' * 10**5 + b'\\n')", "channel"),
     "a huge integer": ("WRITE(b'1' * 10**5 + b'\\n')", "channel"),
     "not text": ("WRITE(bytes(range(128, 256)) + b'\\n')", "channel"),
+    "junk for a failure": (
+        "driver = sys.modules['driver']\ntell = driver.tell\n"
+        "driver.tell = lambda a, w: tell(a, {'id': w['id'], 'failed': {'kind': 1}})",
+        "channel",
+    ),
     "closes all handles": ("os.closerange(0, 99)", "ended its own process"),
     "os._exit(0)": ("os._exit(0)", "ended its own process (exit status 0)"),
     "os.abort": ("os.abort()", "SIGABRT"),
@@ -266,6 +271,11 @@ CALLED: dict[str, tuple[str, str, str]] = {
     "truths for numbers": ("", "driver.row_of = lambda s: [True] * 12", "channel"),
     "answer is a list": ("", "driver.PythonGuest.ask = lambda *_: []", "channel"),
     "done holds junk": ("", "driver.reply = lambda *_: [{'done': {'states': 1}}]", "channel"),
+    "a call without a name": (
+        "ask = driver.PythonGuest.ask",
+        "driver.PythonGuest.ask = lambda *a: ask(*a) | {'calls': [[]]}",
+        "channel",
+    ),
     "two answers": ("", "driver.reply = lambda *_: [{'done': 1}] * 2", "channel"),
     "every line twice": (
         "tell = driver.tell",

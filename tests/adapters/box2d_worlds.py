@@ -12,7 +12,6 @@ WALLS = [((-4, 0), (4, 0)), ((-4, 0), (-4, 30)), ((4, 0), (4, 30)), ((-4, 30), (
 
 
 def play(gravity: float, restitution: float, friction: float) -> str:
-    """The hash of the float32 places and speeds of 60 disks in a box, at each of 600 steps."""
     world = Box2D.b2World(gravity=(0, gravity))
     for ends in WALLS:
         world.CreateStaticBody().CreateEdgeFixture(

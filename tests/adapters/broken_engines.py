@@ -18,8 +18,6 @@ from crosscheck2d.scenarios.model import State
 
 
 class Sound(Reference):
-    """The reference as it is; the base of everything below."""
-
     def __init__(self) -> None:
         super().__init__(exercise)
 
@@ -44,15 +42,11 @@ class GivesLiveView(Sound):
 
 
 class IgnoresDt(Sound):
-    """Always 1/60 s."""
-
     def load(self, scene, dt):  # noqa: ARG002 - that is the fault
         super().load(scene, 1 / 60)
 
 
 class IgnoresCount(Sound):
-    """`step(3)` is one step."""
-
     def step(self, count=1):
         super().step(min(count, 1))
 
@@ -65,16 +59,12 @@ class SquaresRestitution(Sound):
 
 
 class StopsSlowCollisions(Sound):
-    """Everything that closes at less than 1 m/s is inelastic."""
-
     def load(self, scene, dt):
         slow = np.ptp(scene.velocity, axis=0).max() < 1
         super().load(replace(scene, restitution=0.0) if slow else scene, dt)
 
 
 class NanAtStep7(Sound):
-    """The seventh step divides by zero."""
-
     def step(self, count=1):
         for _ in range(count):
             super().step()
@@ -100,8 +90,6 @@ class LoadKeepsCollisions(Sound):
 
 
 class LoadKeepsForce(Sound):
-    """A force that waited for a step waits on."""
-
     def load(self, scene, dt):
         waiting = self.disks.force.sum(axis=0) if getattr(self, "forced", False) else None
         super().load(scene, dt)
@@ -133,8 +121,6 @@ class PutsStaticLast(Sound):
 
 
 class ReadsFloat32(Sound):
-    """The engine's own precision, passed on."""
-
     def read(self):
         return State(*(array.astype(np.float32) for array in vars(super().read()).values()))
 
@@ -149,8 +135,6 @@ class MassFromDensity(Sound):
 
 
 class SolidDiskInertia(Sound):
-    """The inertia of the scene is not set."""
-
     def load(self, scene, dt):
         super().load(replace(scene, inertia=scene.mass * scene.radius**2 / 2), dt)
 
@@ -182,8 +166,6 @@ class StaticGivesWay(Sound):
 
 
 class ReportsNoCollisions(Sound):
-    """The contact listener was never registered."""
-
     def collisions(self):
         return []
 
@@ -201,15 +183,11 @@ class NumbersWallsFromTheEnd(Sound):
 
 
 class CountsStepsFromOne(Sound):
-    """The step counter is raised before the collisions are logged."""
-
     def collisions(self):
         return [collision._replace(step=collision.step + 1) for collision in self.log]
 
 
 class ReportsImpulsePerSecond(Sound):
-    """A contact force is reported where an impulse is asked for."""
-
     def collisions(self):
         return [collision._replace(impulse=collision.impulse / self.dt) for collision in self.log]
 
@@ -227,16 +205,12 @@ class RubsSidewise(Sound):
 
 
 class FallsAsleep(Sound):
-    """What is slower than 1 cm/s is stopped."""
-
     def step(self, count=1):
         super().step(count)
         self.disks.velocity[np.hypot(*self.disks.velocity.T) < 0.01] = 0.0
 
 
 class HasSpeedLimit(Sound):
-    """No disk is faster than 400 m/s."""
-
     def step(self, count=1):
         super().step(count)
         self.disks.velocity[...] = np.clip(self.disks.velocity, -400.0, 400.0)
@@ -252,8 +226,6 @@ class WrapsAngles(Sound):
 
 
 class RaisesInStep(Sound):
-    """An engine that gives up."""
-
     def step(self, count=1):
         super().step(count)
         raise RuntimeError("island solver ran out of memory")
@@ -268,8 +240,6 @@ class Exact(Reference):
 
 
 class Freezes(Exact):
-    """Stands still after the start."""
-
     def step(self, count=1):
         self.disks.velocity[...] = 0.0
         self.disks.angular_velocity[...] = 0.0
@@ -291,20 +261,14 @@ class Scales(Exact):
 
 
 class DoublesSpeed(Scales):
-    """Everything is twice as fast."""
-
     factor = 2.0
 
 
 class GainsEnergy(Scales):
-    """Everything has 10 % more energy."""
-
     factor = 1.1**0.5
 
 
 class RefusesAll(Sound):
-    """An engine that can model nothing."""
-
     def load(self, scene, dt):
         super().load(replace(scene, friction=0.0), dt)
         raise Unsupported("no disks here")
@@ -342,5 +306,4 @@ CAUGHT_BY: dict[type[Engine], str] = {
 
 
 def row_of(make: Callable[[], Engine]) -> EngineRow:
-    """A row like the reference's, with another engine."""
     return replace(ENGINES["reference:exercise"], make=make)

@@ -25,9 +25,8 @@ from crosscheck2d.adapters.mechanisms.table import (
     mechanisms_of,
     with_mechanisms,
 )
-from crosscheck2d.adapters.play import play
+from crosscheck2d.adapters.play import play, play_once
 from crosscheck2d.adapters.reference import Reference
-from crosscheck2d.adapters.run import Run
 from crosscheck2d.reference_impl import exercise
 from crosscheck2d.scenarios.catalogue import scenario
 from crosscheck2d.scenarios.families.placing import lay_out
@@ -48,7 +47,6 @@ def positions(engine: Any, scene: Scenario, dt: float) -> Array:
     "name", ["oblique_e09", "falling_box", "asteroids", "ship_thrust", "disk_between_static_disks"]
 )
 def test_with_nothing_enabled_it_is_the_exercise_to_the_bit(name: str):
-    """Pairs, walls, the wrap, forces, and disks that stand still; positions and collisions."""
     scene = scenario(name)
     plain, ablated = (
         play(engine, "one:run", scene, scene.dt(scene.substeps[1])).trajectory
@@ -65,7 +63,7 @@ def test_with_nothing_enabled_it_is_the_exercise_to_the_bit(name: str):
 @pytest.mark.parametrize("order", [END_OF_STEP["order"], *ORDERS.values()])
 @pytest.mark.parametrize("alpha", [0.0, 0.5, 0.625, 1.0])
 def test_free_flight_is_off_by_its_closed_form_in_any_order(order: tuple[str, ...], alpha: float):
-    """(alpha - 1/2) a dt t, whichever stage comes first and however many moves there are."""
+    # (alpha - 1/2) a dt t, whichever stage comes first and however many moves there are.
     scene = scenario("free_fall")
     dt = scene.dt(2)
     assert scene.truth is not None
@@ -80,7 +78,7 @@ def test_free_flight_is_off_by_its_closed_form_in_any_order(order: tuple[str, ..
 
 
 def test_a_late_collision_is_off_by_the_change_of_velocity_times_its_delay():
-    """Equal disks head-on: each goes on for tau, so that it is (v' - v) tau off for ever after."""
+    # Equal disks head-on: each goes on for tau, so that it is (v' - v) tau off for ever after.
     scene = scenario("head_on_equal_e1")
     dt, (a, b) = scene.dt(2), scene.scene.position
     closing = scene.scene.velocity[0] - scene.scene.velocity[1]
@@ -98,8 +96,7 @@ def test_a_late_collision_is_off_by_the_change_of_velocity_times_its_delay():
 def test_a_ball_gains_speed_times_dt_of_height_where_it_bounces_off_a_velocity_after_gravity(
     order: tuple[str, ...], gain: float
 ):
-    """And nothing where it bounces off that before: per bounce, with the flight of such an
-    engine."""
+    # A gain per bounce, with the flight of such an engine; none off a velocity before gravity.
     scene = scenario("bouncing_ball_e1")
     dt, g = scene.dt(4), -scene.scene.gravity[1]
     fall = scene.scene.position[0, 1] - scene.scene.radius[0]
@@ -110,14 +107,6 @@ def test_a_ball_gains_speed_times_dt_of_height_where_it_bounces_off_a_velocity_a
 
     # The apex is read off samples, and off a step that is up to a whole one away from it.
     assert apex / (speed * dt) == pytest.approx(gain, abs=0.1)
-
-
-def run_of(name: str, scene: Scenario, dt: float) -> Run:
-    """An engine's own run."""
-    engine = ENGINES[name].make()
-    run = play(engine, name, scene, dt)
-    engine.close()
-    return run
 
 
 @pytest.mark.parametrize(
@@ -142,11 +131,10 @@ def run_of(name: str, scene: Scenario, dt: float) -> Run:
 def test_with_all_its_mechanisms_the_reference_is_the_engine(
     name: str, scene: str, samples: int, bound: float
 ):
-    """And without them it is far from it."""
     played = scenario(scene)
     played = replace(played, duration=samples * played.sample_interval)
     dt = played.dt(4)
-    run = run_of(name, played, dt)
+    run = play_once(ENGINES[name].make, name, played, dt)
     assert run.trajectory is not None
     mechanisms = mechanisms_of(name, run.settings, played.scene, dt)
     everything = positions(with_mechanisms(mechanisms), played, dt)
@@ -169,10 +157,11 @@ def test_with_all_its_mechanisms_the_reference_is_the_engine(
 def test_what_is_disabled_in_the_engine_is_what_is_left_out_in_the_reference(
     name: str, scene: str, mechanism: str
 ):
-    """The engine without it is the reference with all but it."""
     played = scenario(scene)
     dt = played.dt(4)
-    mechanisms = mechanisms_of(name, run_of(name, played, dt).settings, played.scene, dt)
+    mechanisms = mechanisms_of(
+        name, play_once(ENGINES[name].make, name, played, dt).settings, played.scene, dt
+    )
     left_out = next(each for each in mechanisms if each.name == mechanism)
     assert left_out.without is not None
     engine = left_out.without()
@@ -187,15 +176,16 @@ def test_what_is_disabled_in_the_engine_is_what_is_left_out_in_the_reference(
 
 
 def test_every_engine_with_mechanisms_is_known_and_flies_as_its_row_says():
-    """The table of mechanisms names rows of `ENGINES` and `FETCHED`; the impulse is what an
-    engine's own order of stages is."""
     assert set(MECHANISMS) < {*ENGINES, *FETCHED}
     scene = scenario("head_on_equal_e09")
     for name in filter(ENGINES.__contains__, MECHANISMS):
         mechanisms = {
             each.name: each
             for each in mechanisms_of(
-                name, run_of(name, scene, 0.1 / 6).settings, scene.scene, 0.1 / 6
+                name,
+                play_once(ENGINES[name].make, name, scene, 0.1 / 6).settings,
+                scene.scene,
+                0.1 / 6,
             )
         }
         assert mechanisms[FLIGHT].parameters == {"alpha": ENGINES[name].alpha}
@@ -233,7 +223,6 @@ for order, more in (*((o, {}) for o in (EXERCISE, BOX2D, PYMUNK, BOX2D_V3)), (BO
 
 @pytest.mark.slow
 def test_plain_python_gives_the_same_bits_as_the_compiled_solver():
-    """A crowd with walls, gravity, friction and a static disk, through every stage."""
     outputs = [
         subprocess.run(
             [sys.executable, "-c", PLAIN],
@@ -259,7 +248,7 @@ ROW = lay_out(
 
 
 def found(stage: str) -> list[tuple[int, int]]:
-    """The contacts of `ROW`, three disks and two, all on a floor, as a stage orders them."""
+    # The contacts of `ROW`, three disks and two, all on a floor, as a stage orders them.
     engine = AblatedReference(("accelerate", "detect", stage, "move"), touching=True, margin=0.01)
     engine.load(ROW, 0.001)
     engine.step(1)
@@ -267,7 +256,6 @@ def found(stage: str) -> list[tuple[int, int]]:
 
 
 def test_colours_never_hold_a_moving_disk_twice_and_what_stands_comes_after_the_first():
-    """Pairs 01 and 34, then 12 with the floors of the others, then those of 1 and 2."""
     assert found("by_colour") == [
         (0, 1),
         (3, 4),
@@ -281,8 +269,6 @@ def test_colours_never_hold_a_moving_disk_twice_and_what_stands_comes_after_the_
 
 
 def test_islands_come_from_the_last_disk_on_and_the_floor_joins_none():
-    """First all of the last two, then all of the first three, each from its last disk to its
-    first."""
     assert found("by_island") == [
         (4, -1),
         (3, 4),

@@ -26,24 +26,20 @@ from tests.tolerances import DEPARTURES
 
 @cache
 def findings_of(name):
-    """The findings of a row of ENGINES, by probe."""
     return {finding.probe: finding for finding in conform(name, ENGINES[name])}
 
 
 def found_in(make):
-    """The findings of an engine that is not in ENGINES, by probe."""
     return {finding.probe: finding for finding in conform("broken:one", row_of(make))}
 
 
 @pytest.mark.parametrize("name", ENGINES)
 def test_no_engine_breaks_the_protocol(name):
-    """Every number of every engine may be shown."""
     assert [finding for finding in findings_of(name).values() if finding.verdict == "breaks"] == []
 
 
 @pytest.mark.parametrize("name", ENGINES)
 def test_the_departures_of_an_engine_are_exactly_those_in_the_table(name):
-    """Strict both ways: a departure that is gone is news as well."""
     known = {departure.probe for departure in DEPARTURES if departure.engine == name}
     found = {probe for probe, finding in findings_of(name).items() if finding.verdict != "keeps"}
     table, new, gone = "DEPARTURES of tests/tolerances.py", sorted(found - known), known - found
@@ -53,7 +49,6 @@ def test_the_departures_of_an_engine_are_exactly_those_in_the_table(name):
 
 @pytest.mark.parametrize("departure", DEPARTURES, ids=lambda d: f"{d.engine}-{d.probe}")
 def test_a_departure_is_as_large_as_its_cause_makes_it(departure):
-    """The cause gives a number, and the bound is rounding alone."""
     finding = findings_of(departure.engine)[departure.probe]
     if isinstance(departure.value, str):
         assert finding.got == departure.value
@@ -63,8 +58,8 @@ def test_a_departure_is_as_large_as_its_cause_makes_it(departure):
 
 
 def test_only_shipped_profiles_depart_from_the_impact_law():
-    """The matched profiles and the reference keep e at every speed, momentum, and the tangential
-    velocities; but for Box2D 3.1, whose friction in a bounce no setting makes right."""
+    # The matched profiles and the reference keep e at every speed, momentum, and the tangential
+    # velocities; but for Box2D 3.1, whose friction in a bounce no setting makes right.
     law = {probe for probe in PROBES if probe.startswith(("restitution", "friction", "pair"))}
     departing = {
         name
@@ -85,33 +80,28 @@ def test_only_shipped_profiles_depart_from_the_impact_law():
 
 
 def give_each_shape_the_root(engine):
-    """The product of two roots is e."""
     for shape in engine.index:
         shape.elasticity = sqrt(engine.scene.restitution)
 
 
 def smooth_box2d(engine):
-    """No friction on any fixture."""
     for body in engine.bodies:
         for fixture in body.fixtures:
             fixture.friction = 0.0
 
 
 def smooth_box2d_v3(engine):
-    """No friction on any shape."""
     for body in engine.bodies:
         for shape in body.shapes:
             shape.friction = 0.0
 
 
 def give_each_shape_the_root_of_friction(engine):
-    """The product of two roots is mu."""
     for shape in engine.index:
         shape.friction = sqrt(engine.scene.friction)
 
 
 def setting(name, value):
-    """A world with one setting changed."""
     return lambda engine: setattr(engine.world, name, value)
 
 
@@ -132,8 +122,6 @@ SETTINGS_OF_PROBES = {
 
 
 def tuned(row, tune):
-    """A row whose engines are changed by `tune` after every load."""
-
     def make():
         engine = row.make()
         load = engine.load
@@ -150,13 +138,12 @@ def tuned(row, tune):
 
 @pytest.mark.parametrize(("name", "probe"), SETTINGS_OF_PROBES)
 def test_a_departure_goes_when_its_cause_is_turned_off(name, probe):
-    """One setting, and the engine keeps."""
     reading = PROBES[probe].read(tuned(ENGINES[name], SETTINGS_OF_PROBES[name, probe]))
     assert reading.kept, reading
 
 
 def test_the_speed_limit_of_box2d_v3_goes_with_its_option():
-    """It is fixed when the world is made, so it is turned off before."""
+    # It is fixed when the world is made, so it is turned off before.
 
     def make():
         engine = ENGINES["box2d_v3:shipped"].make()
@@ -168,15 +155,14 @@ def test_the_speed_limit_of_box2d_v3_goes_with_its_option():
 
 @pytest.mark.parametrize("name", ["box2d:shipped", "box2d_v3:shipped"])
 def test_the_threshold_of_both_box2ds_is_1_metre_per_second(name):
-    """In Box2D 2.3 it is compiled in, so it is shown from both sides."""
     assert not restitution(ENGINES[name], 0.999).kept
     assert restitution(ENGINES[name], 1.001).kept
 
 
 @pytest.mark.parametrize("dt", [1 / 32, 1 / 64, 1 / 128])
 def test_box2d_moves_a_disk_by_at_most_two_metres_a_step(dt):
-    """The cap is on the way, so half the dt doubles the speed; matched has units as long as half of
-    it."""
+    # The cap is on the way, so half the dt doubles the speed; matched has units as long as half of
+    # it.
     for name, speed in (("box2d:shipped", 2 / dt), ("box2d:matched", 512.0)):
         with loaded(ENGINES[name], one_disk(velocity=(512.0, 0.0)), dt=dt) as engine:
             engine.step()
@@ -186,7 +172,7 @@ def test_box2d_moves_a_disk_by_at_most_two_metres_a_step(dt):
 
 @pytest.mark.parametrize("substeps_in_1s", [512, 1024, 2048, 4096])
 def test_box2d_v3_turns_by_the_arc_tangent_a_substep(substeps_in_1s):
-    """Normalised Euler: short by (w h)2 / 3 of the angle, so half the dt leaves a quarter."""
+    # Normalised Euler: short by (w h)2 / 3 of the angle, so half the dt leaves a quarter.
     steps, spin = substeps_in_1s // 4, 20.0
     with loaded(ENGINES["box2d_v3:matched"], one_disk(spin=spin), dt=1 / steps) as engine:
         for _ in range(16):
@@ -198,7 +184,7 @@ def test_box2d_v3_turns_by_the_arc_tangent_a_substep(substeps_in_1s):
 
 @pytest.mark.parametrize("e", [0.0, 0.25, 0.5, 0.9, 1.0])
 def test_the_friction_of_box2d_v3_is_bounded_by_the_impulse_before_restitution(e):
-    """So its effective coefficient is 0.6 / (1 + e), where Box2D 2.3 has 0.2 at every e."""
+    # Its effective coefficient is 0.6 / (1 + e), where Box2D 2.3 has 0.2 at every e.
     for name, coefficient in (("box2d_v3:shipped", 0.6 / (1 + e)), ("box2d:shipped", 0.2)):
         with loaded(ENGINES[name], replace(head_on(2.0, spin=40.0), restitution=e)) as engine:
             before = engine.read().velocity[1]
@@ -231,7 +217,6 @@ class AsBox2DV3:
     ],
 )
 def test_a_departure_of_the_friction_of_box2d_v3_goes_with_its_mechanism(probe, left_out):
-    """What cannot be turned off in the engine is in the reference that does as the engine."""
     found = findings_of("box2d_v3:matched")[probe].got
     row = ENGINES["box2d_v3:matched"]
     with_all = PROBES[probe].read(replace(row, make=AsBox2DV3))
@@ -242,27 +227,22 @@ def test_a_departure_of_the_friction_of_box2d_v3_goes_with_its_mechanism(probe, 
 
 @pytest.mark.parametrize("broken", CAUGHT_BY, ids=lambda broken: broken.__name__)
 def test_a_broken_adapter_is_caught_by_the_probe_meant_for_it(broken):
-    """With the verdict that this probe gives, and by what it read: no exception counts as
-    caught."""
     finding = found_in(broken)[CAUGHT_BY[broken]]
     assert finding.verdict == PROBES[finding.probe].failure
     assert finding.got != "raised"
 
 
 def test_every_probe_that_can_find_a_broken_protocol_has_a_broken_adapter():
-    """No probe of the protocol is there without a proof that it works."""
     assert {name for name, probe in PROBES.items() if probe.failure == "breaks"} <= set(
         CAUGHT_BY.values()
     )
 
 
 def test_the_untouched_reference_keeps_everything():
-    """So what is caught above is the fault, and not the wrapper around it."""
     assert {finding.verdict for finding in found_in(Sound).values()} == {"keeps"}
 
 
 def test_an_exception_is_a_finding_with_its_message():
-    """Only the probes that step are touched by it, and none stops the suite."""
     found = found_in(RaisesInStep)
     assert list(found) == list(PROBES)
     assert found["order_and_shapes"].verdict == "keeps"
@@ -271,7 +251,6 @@ def test_an_exception_is_a_finding_with_its_message():
 
 
 def test_a_refusal_is_not_asked_and_says_why():
-    """`Unsupported` is in the protocol, so it does not break it, and it is no other physics."""
     found = found_in(RefusesAll).values()
     assert {(finding.verdict, finding.note) for finding in found} == {
         ("not asked", "no disks here")
@@ -279,8 +258,6 @@ def test_a_refusal_is_not_asked_and_says_why():
 
 
 def test_a_missing_library_is_one_finding_with_its_name():
-    """It is said once, not once a probe."""
-
     def make():
         raise ModuleNotFoundError("No module named 'chipmunk5'", name="chipmunk5")
 
@@ -290,7 +267,7 @@ def test_a_missing_library_is_one_finding_with_its_name():
 
 
 def test_every_engine_that_is_made_is_closed():
-    """Box2D v3 has room for 128 worlds in a process."""
+    # Box2D v3 has room for 128 worlds in a process.
     alive = []
 
     class Counted(RaisesInStep):

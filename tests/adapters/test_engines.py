@@ -23,7 +23,7 @@ from crosscheck2d.adapters.conformance.probe import (
 from crosscheck2d.adapters.engine import NOT_REPORTED, Unsupported
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.adapters.mechanisms import ablated_reference
-from crosscheck2d.adapters.play import play
+from crosscheck2d.adapters.play import play, play_once
 from crosscheck2d.adapters.reference import METHODS, Reference
 from crosscheck2d.adapters.run import STATUSES
 from crosscheck2d.reference_impl import exercise
@@ -39,23 +39,16 @@ BOX = [[-5.0, -3.0], [5.0, 3.0]]  # of the exercise
 
 
 def asked(scene, thrusts=(), duration=1.0, sample_interval=0.1):
-    """A scenario without a truth."""
     return Scenario(
         "probe", "What happens?", "here", scene, duration, sample_interval, thrusts=thrusts
     )
 
 
 def played(name, scenario, dt):
-    """A run on a fresh engine, which is closed again."""
-    engine = ENGINES[name].make()
-    try:
-        return play(engine, name, scenario, dt)
-    finally:
-        engine.close()
+    return play_once(ENGINES[name].make, name, scenario, dt)
 
 
 def played_or_skipped(name, scenario, dt):
-    """The same of a scene that an engine may refuse."""
     run = played(name, scenario, dt)
     if run.status == "unsupported":
         pytest.skip(run.reason)
@@ -64,7 +57,6 @@ def played_or_skipped(name, scenario, dt):
 
 @contextmanager
 def or_skipped():
-    """Around the use of an engine that may refuse the scene."""
     try:
         yield
     except Unsupported as refusal:
@@ -72,27 +64,12 @@ def or_skipped():
 
 
 def arrays(trajectory):
-    """Every array of a trajectory as bytes."""
-    collisions = trajectory.collisions
-    return [
-        array.tobytes()
-        for array in (
-            trajectory.t,
-            trajectory.position,
-            trajectory.velocity,
-            trajectory.angle,
-            trajectory.angular_velocity,
-            collisions.t,
-            collisions.i,
-            collisions.j,
-            collisions.impulse,
-        )
-    ]
+    fields = vars(trajectory) | vars(trajectory.collisions)
+    return [array.tobytes() for array in fields.values() if isinstance(array, np.ndarray)]
 
 
 @pytest.mark.parametrize("name", ENGINES)
 def test_a_thrust_that_starts_and_stops_inside_steps_gives_its_exact_impulse(name):
-    """0.013 s to 0.687 s in steps of 0.02 s: the first and last thrust carry a share of a step."""
     thrust = Thrust(0, 0.013, 0.687, [3.0, -2.0], torque=0.4)
     end = played(name, asked(one_disk(), [thrust]), 0.02).trajectory.at(-1)
     seconds, digits = 0.687 - 0.013, ENGINES[name].rounding
@@ -103,7 +80,6 @@ def test_a_thrust_that_starts_and_stops_inside_steps_gives_its_exact_impulse(nam
 
 @pytest.mark.parametrize("name", ENGINES)
 def test_a_body_frame_thrust_turns_with_the_disk(name):
-    """A disk that stands at a right angle is accelerated along y by a force along its own x."""
     scene = replace(one_disk(), angle=np.array([np.pi / 2]))
     thrust = Thrust(0, 0.0, 1.0, [7.3, 0.0], frame="body")
     end = played(name, asked(scene, [thrust]), 0.05).trajectory.at(-1)
@@ -120,7 +96,6 @@ def test_a_body_frame_thrust_turns_with_the_disk(name):
     at_once=st.integers(1, 9),
 )
 def test_the_shares_of_a_thrust_add_up_to_its_length(start, lasts, dt, at_once):
-    """However the steps are cut into samples, and no step is lost or done twice."""
     thrust = Thrust(0, start, start + lasts, [1.0, 0.0])
     steps = at_once * (int((start + lasts) / dt / at_once) + 1)
     cuts = [
@@ -137,7 +112,6 @@ def test_the_shares_of_a_thrust_add_up_to_its_length(start, lasts, dt, at_once):
 
 @pytest.mark.parametrize("name", ENGINES)
 def test_an_engine_plays_friction_or_says_that_it_does_not(name):
-    """None leaves it out and says nothing: a disk that slides along the floor turns in the end."""
     one = from_catalogue("slip_to_roll")
     run = played(name, one, one.dt(1))
     if run.status == "unsupported":
@@ -152,7 +126,6 @@ def test_an_engine_plays_friction_or_says_that_it_does_not(name):
 
 @pytest.mark.parametrize("name", ENGINES)
 def test_a_disk_that_leaves_the_box_flies_on_from_the_opposite_edge_and_keeps_its_velocity(name):
-    """All but the exercise, which sets it onto the edge, however far it was beyond."""
     scene = Scene(
         position=[[4.99, 1.0], [1.0, -2.99]],
         velocity=[[2.0, 0.0], [0.0, -2.0]],
@@ -185,7 +158,6 @@ def test_a_disk_that_leaves_the_box_flies_on_from_the_opposite_edge_and_keeps_it
 
 @pytest.mark.parametrize("name", ENGINES)
 def test_disks_do_not_see_each_other_across_the_edge_but_meet_after_it(name):
-    """Nothing happens while their images overlap; a collision once both are on the same side."""
     scene = Scene(
         position=[[4.9, 0.0], [-4.2, 0.0]],
         velocity=[[2.0, 0.0], [0.0, 0.0]],
@@ -221,7 +193,6 @@ def test_disks_do_not_see_each_other_across_the_edge_but_meet_after_it(name):
     ids=lambda change: next(iter(change)),
 )
 def test_a_value_beyond_float32_is_refused_with_its_name(name, change):
-    """Not rounded to infinity or zero."""
     scene = replace(one_disk(), **{key: np.array(value) for key, value in change.items()})
     run = played(name, asked(scene), 0.1)
     assert run.status == "unsupported"
@@ -234,8 +205,8 @@ def test_a_value_beyond_float32_is_refused_with_its_name(name, change):
     "change", [{"velocity": [[1e37, 0.0]]}, {"gravity": [0.0, 1e34]}, {"position": [[2e38, 0.0]]}]
 )
 def test_a_value_beyond_float32_in_the_units_of_matched_box2d_is_refused(change):
-    """It fits as the scene states it, and does not once the unit of time is 1000 s and that of
-    length 0.5 m."""
+    # It fits as the scene states it, and does not once the unit of time is 1000 s and that of
+    # length 0.5 m.
     scene = replace(one_disk(), **{key: np.array(value) for key, value in change.items()})
     run = played("box2d:matched", asked(scene), 0.1)
     assert run.status == "unsupported"
@@ -247,7 +218,6 @@ def test_a_value_beyond_float32_in_the_units_of_matched_box2d_is_refused(change)
     [("pymunk:shipped", "pymunk"), ("box2d:matched", "Box2D"), ("box2d_v3:shipped", "pyb2d3")],
 )
 def test_a_missing_library_is_a_refusal_with_its_name(name, library, monkeypatch):
-    """A cell of that engine says so; nothing else fails."""
     adapter = f"crosscheck2d.adapters.{name.split(':')[0]}"
     monkeypatch.delitem(sys.modules, adapter, raising=False)
     monkeypatch.setitem(sys.modules, library, None)
@@ -260,22 +230,17 @@ def test_a_missing_library_is_a_refusal_with_its_name(name, library, monkeypatch
     "name", ["reference:exercise", "reference:lesson", "pymunk:shipped", "pymunk:matched"]
 )
 def test_a_fast_disk_is_no_runaway(name):
-    """However far it gets: it was asked to fly there."""
     run = played(name, asked(one_disk(velocity=(4e9, 0.0))), 0.05)
     assert run.status == "ok"
 
 
 class Thrower(Reference):
-    """Ten times as fast after every step."""
-
     def step(self, count=1):
-        """Then faster."""
         super().step(count)
         self.disks.velocity[:] *= 10.0
 
 
 def test_a_disk_thrown_by_its_engine_is_diverged_and_says_how_far_and_when():
-    """A thousand times as far as it can fly; the samples before it are kept."""
     run = play(Thrower(exercise), "broken:thrower", asked(one_disk(velocity=(1.0, 0.0))), 0.1)
     assert run.status == "diverged"
     assert (
@@ -290,14 +255,13 @@ def run_away(steps: int) -> float:
 
 
 def test_a_number_that_is_not_finite_is_diverged_and_says_which_and_when():
-    """Step 7 of 0.05 s is in the interval that ends at 0.4 s."""
+    # Step 7 of 0.05 s is in the interval that ends at 0.4 s.
     run = play(NanAtStep7(), "broken:nan", asked(one_disk()), 0.05)
     assert (run.status, run.reason) == ("diverged", "position of disk 0 is not finite at 0.4 s")
     assert len(run.trajectory) == 4
 
 
 def test_an_engine_that_raises_is_an_error_with_its_message():
-    """The state before it is kept."""
     run = play(RaisesInStep(), "broken:raises", asked(one_disk()), 0.05)
     assert (run.status, run.reason) == ("error", "RuntimeError: island solver ran out of memory")
     assert len(run.trajectory) == 1
@@ -305,25 +269,16 @@ def test_an_engine_that_raises_is_an_error_with_its_message():
 
 
 def test_a_dt_that_does_not_divide_the_sample_interval_is_not_played():
-    """It is the caller's mistake, so it is no status."""
     with pytest.raises(ValueError, match=r"0\.03 s does not divide the sample interval 0\.1 s"):
         played("reference:exercise", asked(one_disk()), 0.03)
-
-
-def told_or_skipped(name, scene):
-    """The settings and versions of an engine in a scene that it may refuse."""
-    try:
-        with loaded(ENGINES[name], scene) as engine:
-            return engine.settings(), engine.versions()
-    except Unsupported as refusal:
-        pytest.skip(str(refusal))
 
 
 @pytest.mark.parametrize("name", ENGINES)
 @pytest.mark.parametrize("e", [0.5, 1.0])
 def test_what_was_asked_of_an_engine_is_what_it_resolved(name, e):
-    """Every setting has a resolved value, and it is the one asked for, where one was."""
-    settings, versions = told_or_skipped(name, replace(plain(), restitution=e))
+    scene = replace(plain(), restitution=e)
+    with or_skipped(), loaded(ENGINES[name], scene) as engine:
+        settings, versions = engine.settings(), engine.versions()
     assert settings
     assert versions
     for setting, (wanted, resolved) in settings.items():
@@ -340,7 +295,6 @@ HAND_WRITTEN = [name for name in ENGINES if name.startswith("reference:")]
 
 
 def test_a_hand_written_solver_says_its_integrator_and_is_entered_with_two_arrays():
-    """Neither is missed by a run: settings would just be shorter, and calls longer."""
     solvers = {name: ENGINES[name].make() for name in HAND_WRITTEN}
 
     assert all(isinstance(solver, Reference) for solver in solvers.values())
@@ -352,7 +306,6 @@ def test_a_hand_written_solver_says_its_integrator_and_is_entered_with_two_array
 
 
 def test_matched_pymunk_resolves_slop_and_iterations_as_asked():
-    """A share of the smallest radius, and a number."""
     from crosscheck2d.adapters.pymunk import MATCHED
 
     with loaded(ENGINES["pymunk:matched"], plain()) as engine:
@@ -363,8 +316,8 @@ def test_matched_pymunk_resolves_slop_and_iterations_as_asked():
 
 
 def test_box2d_v3_reads_its_length_unit_off_the_engine():
-    """Off a default that is a multiple of it; negative control: what was asked for is not simply
-    repeated."""
+    # Off a default that is a multiple of it; negative control: what was asked for is not simply
+    # repeated.
     import pyb2d3
 
     with loaded(ENGINES["box2d_v3:matched"], plain()) as engine:
@@ -377,8 +330,8 @@ def test_box2d_v3_reads_its_length_unit_off_the_engine():
 
 @pytest.mark.parametrize("name", ENGINES)
 def test_a_setting_that_cannot_be_read_back_says_so(name):
-    """An argument of every step is kept by nobody, so it is not what was asked for."""
-    settings, _ = told_or_skipped(name, plain())
+    with or_skipped(), loaded(ENGINES[name], plain()) as engine:
+        settings = engine.settings()
     for setting in ("substeps", "velocity, position iterations"):
         if setting in settings and "box2d" in name:
             assert settings[setting][1] == "passed with every step"
@@ -391,8 +344,8 @@ def test_a_setting_that_cannot_be_read_back_says_so(name):
 
 @pytest.mark.parametrize("name", ["box2d:shipped", "box2d:matched"])
 def test_box2d_tells_its_own_sleep_setting(name):
-    """`world.allowSleeping` of box2d-py 2.3.8 is an attribute of the Python object that the engine
-    never sees."""
+    # `world.allowSleeping` of box2d-py 2.3.8 is an attribute of the Python object that the engine
+    # never sees.
     with loaded(ENGINES[name], plain()) as engine:
         assert (
             engine.settings()["sleeping"][1]
@@ -403,7 +356,6 @@ def test_box2d_tells_its_own_sleep_setting(name):
 
 @pytest.mark.parametrize("name", ENGINES)
 def test_an_engine_repeats_itself_bit_for_bit(name):
-    """Twenty-one disks that spin, collide and wrap, with a thrust on one of them."""
     scenario = replace(
         from_catalogue("asteroids", 1), thrusts=[Thrust(0, 0.11, 0.63, [0.2, 0.1], torque=0.05)]
     )
@@ -417,7 +369,6 @@ def test_an_engine_repeats_itself_bit_for_bit(name):
 
 
 def test_all_engines_at_once_play_as_each_alone():
-    """As in the game: no engine changes what is global to the process behind another's back."""
     alone, together = {}, {}
     for name, row in ENGINES.items():
         with loaded(row, plain()) as engine:

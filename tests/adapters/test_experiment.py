@@ -36,13 +36,12 @@ SLIDES = np.degrees(np.arctan(7 / 2 * FRICTION * (1 + RESTITUTION)))
 
 
 def departures(quantity: str) -> pd.Series:
-    """Of the experiment from the exact answer, relative; by angle."""
+    # Of the experiment from the exact answer, relative; by angle.
     rows = TABLE[TABLE.quantity == quantity].drop_duplicates("angle_deg").set_index("angle_deg")
     return abs(rows.experiment / rows.exact - 1)
 
 
 def test_the_experiment_is_within_a_percent_of_the_exact_speed_where_the_sphere_slides():
-    """And within 8 % in spin; readme states the digits."""
     speed, spin = departures("e_t"), departures("spin_rad_s")
     assert round(speed[speed.index > SLIDES].min(), 4) >= 0.001
     assert speed[speed.index > SLIDES].max() <= 0.0065
@@ -51,13 +50,11 @@ def test_the_experiment_is_within_a_percent_of_the_exact_speed_where_the_sphere_
 
 
 def test_the_model_ends_where_a_real_sphere_springs_back():
-    """Below, where it sticks."""
     assert departures("e_t").max() == departures("e_t")[20.22] == pytest.approx(0.16, abs=5e-3)
     assert departures("spin_rad_s").idxmax() < SLIDES == pytest.approx(32.52, abs=5e-3)
 
 
 def test_the_formula_is_the_answer_of_the_oracle():
-    """To the last digits of float64."""
     scenario = oblique_impacts(DT, LEAD + 0.3)
     oracle = with_oracle(replace(scenario, truth=None, without_truth="not yet"))
     ours, exact = (one.truth(one.times[-1:]).at(0) for one in (scenario, oracle))
@@ -67,7 +64,6 @@ def test_the_formula_is_the_answer_of_the_oracle():
 
 
 def test_every_measured_number_is_in_the_table_beside_every_engine_that_takes_it():
-    """And README shows the table."""
     count = sum(int((~np.isnan(MEASURED[key])).sum()) for key in experiment.QUANTITIES)
     assert (TABLE.groupby("engine").size() == count).all()
     assert {"reference:ordered", "pymunk:shipped", "box2d_v3:matched"} <= {*TABLE.engine}
@@ -79,7 +75,6 @@ def test_every_measured_number_is_in_the_table_beside_every_engine_that_takes_it
     "name", ["reference:ordered", "pymunk:matched", "box2d:shipped", "box2d_v3:matched"]
 )
 def test_an_engine_reads_what_is_kept_of_it(name):
-    """With the same versions; else `crosscheck2d.adapters.conformance.experiment` is run anew."""
     rows = pd.DataFrame(rows_of(name, ENGINES[name], experiment.exact()))
     kept = TABLE[TABLE.engine == name].reset_index(drop=True)
     assert rows.drop(columns="engine").columns.equals(kept.drop(columns="engine").columns)
@@ -89,7 +84,6 @@ def test_an_engine_reads_what_is_kept_of_it(name):
 
 
 def test_an_engine_with_another_friction_departs():
-    """The negative control: 1.1 times the friction is off by more than the experiment."""
     row = EngineRow(partial(changed, "pymunk:matched", friction=1.1), "", 0.0, 2.0**-53)
     rows = pd.DataFrame(rows_of("pymunk:matched", row, experiment.exact()))
     slides = rows[(rows.quantity == "e_t") & (rows.angle_deg > SLIDES)]

@@ -76,8 +76,6 @@ MEASURED = [
 
 @pytest.mark.parametrize(("e", "mu", "name", "rate", "along", "spin"), MEASURED)
 def test_an_engine_leaves_a_floor_as_it_was_measured(e, mu, name, rate, along, spin):
-    """Of shipped Box2D, which has the scene's friction, and of matched pymunk, which does not
-    square it."""
     # The digits that are given; in Box2D 3.1 the rounding of the floor's length is as much.
     assert left_with(ENGINES[name].make(), thrown(e, mu), rate) == (
         pytest.approx(along, abs=0.001),
@@ -87,8 +85,8 @@ def test_an_engine_leaves_a_floor_as_it_was_measured(e, mu, name, rate, along, s
 
 @pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
 def test_the_friction_of_box2d_2_acts_in_the_middle_between_floor_and_disk(e):
-    """Half of the overlap of disk and skin nearer than the radius: continuous collision stops the
-    disk within the skin, which is 0.01 m thick."""
+    # Half of the overlap of disk and skin nearer than the radius: continuous collision stops the
+    # disk within the skin, which is 0.01 m thick.
     for rate in (60, 960):
         along, spin = left_with(ENGINES[BOX2D].make(), thrown(e, 0.1), rate)
         J = 0.5 * (1 + e)
@@ -99,8 +97,7 @@ def test_the_friction_of_box2d_2_acts_in_the_middle_between_floor_and_disk(e):
 
 @pytest.mark.parametrize("name", ["box2d_v3:shipped", "box2d_v3:matched"])
 def test_the_friction_of_box2d_v3_does_not_see_the_restitution(name):
-    """At 60 Hz and friction 0.1 it takes the same at each e; exact would be (1 + e) times as
-    much."""
+    # At 60 Hz and friction 0.1 it takes the same at each e; exact would be (1 + e) times as much.
     taken = [5 - left_with(ENGINES[name].make(), thrown(e, 0.1), 60)[0] for e in (0.25, 0.5, 1.0)]
     assert taken == pytest.approx([taken[0]] * 3, rel=5 * 8 * FLOAT32)  # of a difference of 5 m/s
     # 0.5 but for the gap that the turning of the disk seems to leave: see below.
@@ -122,8 +119,6 @@ ABLATIONS = [
 
 @pytest.mark.parametrize(("name", "rate", "e", "mu", "off", "explained"), ABLATIONS)
 def test_each_cause_is_shown_by_an_ablation(name, rate, e, mu, off, explained):
-    """With all mechanisms the reference is the engine; without this one it is off by what it
-    explains."""
     asked = thrown(e, mu)
     run = play(ENGINES[name].make(), name, asked, 1 / rate)
     mechanisms = mechanisms_of(name, run.settings, asked.scene, 1 / rate)
@@ -140,7 +135,6 @@ def test_each_cause_is_shown_by_an_ablation(name, rate, e, mu, off, explained):
 
 @pytest.mark.parametrize("name", WITH_OPTION)
 def test_a_scene_without_friction_is_played_as_before(name):
-    """To the bit as with the friction that the engine has of its own; matched has none."""
     for scene in (scenario("oblique_e09"), scenario("box_billiard")):
         friction = OWN_DEFAULT.get(name, 0.0)
         plain, stated = (
@@ -154,7 +148,6 @@ def test_a_scene_without_friction_is_played_as_before(name):
 
 
 def test_an_engine_that_is_another_without_friction_is_played_beside_it_only_with_friction():
-    """So that no scene is played twice to the bit; asked for by itself it is played."""
     rows, rough = ENGINES, thrown(0.5, 0.2).scene
     smooth = thrown(0.5, 0.0).scene
     assert set(rows) - set(told_apart(rows, smooth)) == {"reference:coulomb"}
@@ -164,7 +157,6 @@ def test_an_engine_that_is_another_without_friction_is_played_beside_it_only_wit
 
 
 def test_what_has_limits_of_its_own_is_driven_to_them(tmp_path):
-    """In a case without friction `reference:coulomb` is refused with the engine it is there."""
     asked = ("slow_collision", "touching_break", "--engine", "reference:coulomb")
     refused = crosscheck("stability", *asked, cwd=tmp_path)
     assert refused.returncode == 2

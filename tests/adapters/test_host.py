@@ -64,19 +64,16 @@ def values(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[object, .
 
 @pytest.fixture
 def at(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
-    """The level of a test, also in its guests' parent."""
     monkeypatch.setenv("CROSSCHECK_SANDBOX", request.param)
     return str(request.param)
 
 
 def guest(text: str, kind: str = "python") -> SolverProcess:
-    """A guest of this text."""
     file = Path("mine.py" if kind == "python" else "mine.js")
     return SolverProcess(SolverText(file, kind, text, ""))
 
 
 def obtained(attacks: dict[str, str], values: tuple[object, ...]) -> dict[str, str]:
-    """Attack -> what it obtained, all in one guest."""
     text = HEAD.format(values=values) + "results = {}\n"
     for name, code in attacks.items():
         body = "".join(f"    {line}\n" for line in code.split("\n"))
@@ -94,7 +91,6 @@ def obtained(attacks: dict[str, str], values: tuple[object, ...]) -> dict[str, s
 @BUBBLEWRAP
 @pytest.mark.parametrize("at", ["bubblewrap"], indirect=True)
 def test_an_attack_obtains_nothing_in_the_sandbox(at: str, values: tuple[object, ...]):
-    """All that a hand-in may try, in one guest."""
     assert at in {level.value for level in levels()}
     assert obtained(FORBIDDEN, values) == {}
     assert Path(str(values[0])).read_text() == "20 of 20"
@@ -102,7 +98,6 @@ def test_an_attack_obtains_nothing_in_the_sandbox(at: str, values: tuple[object,
 
 @pytest.mark.parametrize("at", ["none"], indirect=True)
 def test_without_a_sandbox_the_same_attacks_obtain_something(at: str, values: tuple[object, ...]):
-    """The negative control: it is the sandbox that stops them."""
     harmless = ("neighbour's file", "text opened and run", "command lines", "stat of others")
     found = obtained({name: FORBIDDEN[name] for name in harmless}, values)
     assert at == "none"
@@ -112,7 +107,6 @@ def test_without_a_sandbox_the_same_attacks_obtain_something(at: str, values: tu
 @pytest.mark.skipif(not KERNEL or os.geteuid() != 0, reason="only root becomes another user")
 @pytest.mark.parametrize("at", ["another user"], indirect=True)
 def test_another_user_reads_and_signals_nothing_of_root(at: str, values: tuple[object, ...]):
-    """The level without namespaces; `WEAKER` is what SANDBOX.md says that it does not stop."""
     if Level.USER not in levels():
         pytest.skip("another user cannot read this Python")
     attacks = {name: code for name, code in FORBIDDEN.items() if name not in WEAKER}
@@ -123,7 +117,6 @@ def test_another_user_reads_and_signals_nothing_of_root(at: str, values: tuple[o
 @BUBBLEWRAP
 @pytest.mark.parametrize("name", LEFT_BEHIND)
 def test_nothing_is_left_running(name: str, values: tuple[object, ...]):
-    """What it starts lives in a world of its own, which ends with it; it does nothing to others."""
     before, here = running(), state()
     with (
         suppress(SolverFailed),  # some end themselves
@@ -138,14 +131,12 @@ def test_nothing_is_left_running(name: str, values: tuple[object, ...]):
 
 
 def state() -> tuple[object, ...]:
-    """What an attack may have done to this process or to the machine."""
     segments = Path("/proc/sysvipc/shm").read_text()
     listening = [x for x in Path("/proc/net/unix").read_text().split() if "attack" in x]
     return os.getpriority(os.PRIO_PROCESS, 0), os.sched_getaffinity(0), segments, listening
 
 
 def running() -> set[int]:
-    """The guests' processes of this machine that this process, or nobody, has started."""
     found = set()
     for process in psutil.process_iter(["cmdline", "ppid"]):
         if "/host/driver.py" in (process.info["cmdline"] or ()):
@@ -157,7 +148,6 @@ def running() -> set[int]:
 
 @pytest.mark.parametrize("name", FORGED)
 def test_a_forged_answer_ends_the_guest(name: str, values: tuple[object, ...]):
-    """What it writes in place of the driver's answer is no answer."""
     code, said = FORGED[name]
     with pytest.raises(SolverFailed) as failed, guest(HEAD.format(values=values) + code):
         pass
@@ -172,7 +162,6 @@ QUESTION = {"spheres": [BALL], "calls": [["integrate", 0, 0.1]], "world": False}
 
 @pytest.fixture(scope="module")
 def right() -> object:
-    """The answer of the honest file."""
     with guest(PLAIN) as process:
         return process.do("ask", QUESTION, 1.0)["states"]
 
@@ -181,7 +170,6 @@ def right() -> object:
 def test_a_call_gives_its_right_result_or_is_said_to_have_failed(
     name: str, values: tuple[object, ...], right: object
 ):
-    """The type of each field is checked, a second answer has no question, and all ends in time."""
     beside, within, said = CALLED[name]
     head = "def integrate(sphere, dt):\n"
     text = HEAD.format(values=values) + f"driver = sys.modules['driver']\n{beside}\n" + PLAIN
@@ -201,7 +189,6 @@ def test_a_call_gives_its_right_result_or_is_said_to_have_failed(
 
 
 def test_a_sleeping_call_is_ended_by_the_clock():
-    """After three times its limit; what keeps the processor busy ends after its limit."""
     sleeps = PLAIN.replace(
         "def integrate(sphere, dt):\n",
         "def integrate(sphere, dt):\n    import time; time.sleep(99)\n",

@@ -52,7 +52,6 @@ EACH = [  # a second each
 
 
 def drifted(name: str, row: EngineRow) -> list[str]:
-    """The columns in which an engine no longer reads what is kept of `name`."""
     columns = list[str]()
     for fresh in rows_of_table(name, row):
         was = TABLE.loc[(name, fresh["dt"])]
@@ -68,25 +67,21 @@ def drifted(name: str, row: EngineRow) -> list[str]:
 
 @pytest.mark.parametrize("name", EACH)
 def test_an_engine_reads_what_is_kept_of_it(name):
-    """With the same versions; else the command in adapters/README.md writes it anew."""
     assert drifted(name, ROWS[name]) == []
 
 
 def test_an_engine_with_another_restitution_is_noticed():
-    """The negative control: elasticity e for sqrt(e) on a shape."""
     row = EngineRow(partial(changed, "pymunk:shipped", elasticity=0.6), "", 0.0, 2.0**-53)
     assert {"e_slow", "e_2", "e_wall", "e_small"} <= set(drifted("pymunk:shipped", row))
 
 
 def test_the_table_has_every_engine_at_two_step_sizes_and_readme_shows_it():
-    """In their order, and nothing that is not in the file."""
     assert list(TABLE.index) == [(name, dt) for name in ROWS for dt in (FINE, COARSE)]
     assert [f"1/{round(1 / dt)} s" for dt in STEP_SIZES] == [FINE, COARSE]
     assert in_markdown(kept()) in README.read_text("utf-8")
 
 
 def test_a_cell_has_32_readings_at_phases_that_fill_a_step():
-    """Evenly: the widest gap is a 32nd of a step."""
     assert len(PHASES) == COUNT == 32
     assert np.diff(np.sort(PHASES)).max() == pytest.approx(1 / 32)
     with closing(row_of("pymunk:matched").make()) as engine:
@@ -97,7 +92,6 @@ def test_a_cell_has_32_readings_at_phases_that_fill_a_step():
 
 @pytest.mark.parametrize("name", ["pymunk:shipped", "box2d:shipped", "box2d_v3:shipped"])
 def test_the_pairs_of_a_scene_do_not_disturb_each_other(name):
-    """Each pair alone does the same, but for the rounding of its height."""
     scene, alone = pairs(2.0, DT, spin=40.0), list[np.ndarray]()
     with closing(row_of(name).make()) as engine:
         _, together = collide(engine, scene, DT)
@@ -117,7 +111,6 @@ def test_the_pairs_of_a_scene_do_not_disturb_each_other(name):
 
 
 def test_the_air_of_an_engine_is_not_taken_for_its_e():
-    """What the free disk loses, the others have lost, too: e is that of the collision alone."""
     with closing(row_of("pymunk:matched").make()) as engine:
         load = engine.load
 
@@ -142,12 +135,10 @@ def test_the_air_of_an_engine_is_not_taken_for_its_e():
     ],
 )
 def test_a_cell_is_the_median_with_the_range(column, spread, text):
-    """The range where it has other digits; a dash where the engine refuses."""
     assert cell(column, *spread) == text
 
 
 def test_one_engine_is_asked_and_the_rows_of_the_others_are_kept(monkeypatch):
-    """In their order; a name that is none is refused."""
     anew = kept()[lambda table: table.engine == "pymunk:shipped"].assign(date="2100-01-01")
     monkeypatch.setattr(impact_table, "table_of", lambda rows: anew if len(rows) == 2 else None)
     table = impact_table.with_anew(["pymunk"]).reset_index(drop=True)
@@ -160,7 +151,6 @@ def test_one_engine_is_asked_and_the_rows_of_the_others_are_kept(monkeypatch):
 
 
 def test_the_table_takes_its_place_and_leaves_the_rest_of_a_text():
-    """However often it is written."""
     begin, end = "<!-- impact table -->\n", "<!-- end of impact table -->\nafter\n"
     once = replace_table(f"before\n{begin}old\n{end}", MARK, "new\n")
     assert once == f"before\n{begin}new\n{end}"
@@ -171,7 +161,6 @@ def test_the_table_takes_its_place_and_leaves_the_rest_of_a_text():
 
 
 def test_exact_readings_are_read_as_exact():
-    """reference:ordered takes every collision at its own time, with friction."""
     exact = {
         "threshold": 0,
         "e_slow": 0.5,
@@ -189,14 +178,14 @@ def test_exact_readings_are_read_as_exact():
 
 
 def test_the_threshold_of_box2d_is_found_where_it_is_compiled_in():
-    """1 m/s, to the 1 % to which it is looked for."""
+    # 1 m/s, to the 1 % to which it is looked for.
     row = TABLE.loc[("box2d:shipped", FINE)]
     assert 1.0 <= row.threshold_low <= row.threshold_high <= 1.01
     assert row.e_small == 0
 
 
 def test_the_cap_on_spin_is_a_quarter_or_an_eighth_of_a_turn_a_step():
-    """So it depends on the step: 300 rad/s are below it at 1/256 s in Box2D 2.3."""
+    # It depends on the step: 300 rad/s are below it at 1/256 s in Box2D 2.3.
     caps = {("box2d", COARSE): 60 / 4, ("box2d_v3", COARSE): 60 / 8, ("box2d_v3", FINE): 256 / 8}
     for (engine, dt), turns in caps.items():
         # float32; and Box2D 3.1 turns (cos, sin), whose length is rounded

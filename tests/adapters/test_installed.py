@@ -23,7 +23,6 @@ WORLDS = Path(__file__).with_name("box2d_worlds.py")
 
 
 def hashes_of_worlds(first: Path) -> list[str]:
-    """What `box2d_worlds.py` prints; packages in `first` come before those that are installed."""
     done = subprocess.run(
         [sys.executable, WORLDS],
         env=os.environ | {"PYTHONPATH": str(first)},
@@ -37,8 +36,8 @@ def hashes_of_worlds(first: Path) -> list[str]:
 @pytest.mark.slow
 @pytest.mark.skipif(BOX2D != "box2d-py", reason="the wheel itself is installed")
 def test_the_wheel_gives_the_bits_of_what_is_built_from_source(tmp_path: Path):
-    """The published package depends on the wheel, a clone on Linux builds box2d-py: a collapsing
-    pile with friction and a gas, 60 disks each."""
+    # The published package depends on the wheel, a clone on Linux builds box2d-py: a collapsing
+    # pile with friction and a gas, 60 disks each.
     [pin] = [
         line.partition(";")[0] for line in PROJECT["project"]["dependencies"] if "box2d=" in line
     ]
@@ -68,8 +67,6 @@ def test_the_wheel_gives_the_bits_of_what_is_built_from_source(tmp_path: Path):
 
 @pytest.mark.parametrize(("there", "name"), [({"box2d-py"}, "box2d-py"), (set(), "box2d")])
 def test_the_distribution_that_is_there_is_recorded(monkeypatch, there: set[str], name: str):
-    """The wheel is named, too, where nothing is installed: it is what a message can name."""
-
     def version(library: str) -> str:
         if library not in there:
             raise metadata.PackageNotFoundError(library)
@@ -80,7 +77,6 @@ def test_the_distribution_that_is_there_is_recorded(monkeypatch, there: set[str]
 
 
 def test_a_run_records_the_distribution_that_is_installed():
-    """Its version is in the key of each cell."""
     assert ENGINES["box2d:shipped"].distributions == (BOX2D,)
     assert versions()[BOX2D] == metadata.version(BOX2D)
 
@@ -96,7 +92,6 @@ def test_a_run_records_the_distribution_that_is_installed():
 def test_the_way_to_an_extra_is_that_of_the_installation(
     tmp_path: Path, monkeypatch, clone: bool, made_by: str, hint: str
 ):
-    """In a clone by uv, in a clone by pip, from a wheel."""
     (tmp_path / "pyvenv.cfg").write_text(f"home = x{made_by}")
     monkeypatch.setattr(library_versions, "CLONE", clone)
     monkeypatch.setattr(sys, "prefix", str(tmp_path))

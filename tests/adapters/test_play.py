@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from crosscheck2d.adapters.engine import ContactImpulse, Engine, NotStarted, Unsupported
 from crosscheck2d.adapters.engines import ENGINES
-from crosscheck2d.adapters.first_collisions import first_collisions
 from crosscheck2d.adapters.play import play, play_once
+from crosscheck2d.adapters.run import first_collisions
 from crosscheck2d.scenarios.catalogue import scenario
 
 NAME, SCENE = "reference:exercise", scenario("slow_collision")
@@ -22,19 +22,15 @@ DT = SCENE.dt(SCENE.substeps[0])
 
 
 class Closing:
-    """The reference, which counts how often it is closed; `load` raises what it is given."""
-
     def __init__(self, raises: Exception | None = None) -> None:
         self.inner, self.raises, self.closed = ENGINES[NAME].make(), raises, 0
 
     def load(self, scene: Any, dt: float) -> None:
-        """As the reference, unless it is to fail."""
         if self.raises:
             raise self.raises
         self.inner.load(scene, dt)
 
     def close(self) -> None:
-        """Count."""
         self.closed += 1
         self.inner.close()
 
@@ -43,13 +39,10 @@ class Closing:
 
 
 def once(engine: Closing) -> str:
-    """The status of a run on that engine, made anew."""
     return play_once(lambda: cast(Engine, engine), NAME, SCENE, DT).status
 
 
 def test_an_engine_that_is_played_once_is_closed_once_whatever_it_does():
-    """Played to the end, refused, failed, or with an error that is not its own and goes on to the
-    caller."""
     for raises, status in (
         (None, "ok"),
         (Unsupported("no"), "unsupported"),
@@ -69,8 +62,6 @@ def test_an_engine_that_is_played_once_is_closed_once_whatever_it_does():
 
 
 def test_an_engine_whose_library_is_missing_refuses_by_its_name():
-    """A run that says so, and no traceback."""
-
     def missing() -> Engine:
         raise ModuleNotFoundError("No module named 'toyland'", name="toyland")
 
@@ -86,8 +77,7 @@ def test_an_engine_whose_library_is_missing_refuses_by_its_name():
 
 
 def test_no_source_file_closes_an_engine_by_hand():
-    """But the game and the gases, whose engines outlive a function: all else is `play_once` or
-    `closing`."""
+    # The engines of the game and the gases outlive a function; else it is `play_once` or `closing`.
     root = Path(__file__).parents[2]
     found = {
         path.relative_to(root).as_posix()
@@ -100,8 +90,6 @@ def test_no_source_file_closes_an_engine_by_hand():
 
 
 def test_weight_in_consecutive_steps_is_one_collision_and_collisions_are_each_their_own():
-    """Impulses no larger than weight continue the one before; a larger one is a collision again, a
-    step later or not."""
     collisions = [
         ContactImpulse(3, 1, 0, 2.0),
         ContactImpulse(4, 0, 1, 1.0),
@@ -127,7 +115,6 @@ def test_weight_in_consecutive_steps_is_one_collision_and_collisions_are_each_th
     )
 )
 def test_collisions_are_the_beginnings_of_runs_of_impulses(impulses):
-    """Counted the slow way: an impulse whose pair had none in the step before."""
     rows = sorted((step, pair) for step, pair in impulses)
     found = first_collisions(
         [ContactImpulse(step, *pair, 1.0) for step, pair in rows], 1.0, weight=1.0
@@ -138,7 +125,6 @@ def test_collisions_are_the_beginnings_of_runs_of_impulses(impulses):
 
 
 def test_a_negative_impulse_is_a_collision_too():
-    """Of a faulty solver: the collisions are counted; only what is small is rounding."""
     negative = [ContactImpulse(3, 0, 1, -2.0), ContactImpulse(9, 0, 1, -1.0)]
     found = first_collisions([*negative, ContactImpulse(20, 0, 1, -1e-9)], 0.5)
 

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from crosscheck2d.adapters.engines import ENGINES, FETCHED, row_of
-from crosscheck2d.adapters.npm_packages import missing, place
+from crosscheck2d.adapters.npm_packages import missing, pinned_library
 from crosscheck2d.adapters.snippets import TEMPLATES, write_snippet
 from crosscheck2d.scenarios.families.placing import lay_out
 from crosscheck2d.scenarios.model import Array, Scene
@@ -87,7 +87,10 @@ def test_a_javascript_snippet_moves_disks_as_the_adapter_does(
         "console.log(JSON.stringify(bodies.map(position)));\n"
     )
     (tmp_path / "snippet.mjs").write_text(code)
-    (tmp_path / "node_modules").symlink_to(place() / "node_modules")
+    package = FETCHED[name].package
+    there = tmp_path / "node_modules" / package
+    there.parent.mkdir(parents=True)
+    there.symlink_to(pinned_library(package).folder)
     ran = nodejs.node(
         ["snippet.mjs"], return_completed_process=True, cwd=tmp_path, capture_output=True, text=True
     )

@@ -46,7 +46,6 @@ LINES = 'models = "disks"\n'
 
 
 def stepping(begin: str, end: str, name: str = "fly.py") -> str:
-    """An engine whose step does otherwise with the world that it has made."""
     if name.endswith(".js"):
         text = f'const models = "disks";\n{FUNCTIONS_JS}'
         text = text.replace("return world.map", f"{begin}world.map")
@@ -80,7 +79,6 @@ ENGINES = {
 
 @pytest.mark.parametrize("name", ENGINES)
 def test_it_plays_free_flight(name: str, tmp_path: Path):
-    """Each moves as it should, so that no step was lost."""
     (tmp_path / name).write_text(ENGINES[name])
     scene = replace(scenario("head_on_equal_e09"), truth=None)
     run = play_once(row_of_file(tmp_path / name).make, "x:own", scene, scene.dt(1))
@@ -113,7 +111,6 @@ KEEPS = {
 
 @pytest.mark.parametrize("name", KEEPS)
 def test_disks_of_the_scene_before_are_named(name: str, tmp_path: Path):
-    """A list of the module that `create` fills again."""
     text = TEMPLATES["python" if name.endswith(".py") else "javascript"].read_text()
     text = text.replace("scene.radius[i], light", "scene.radius[i], light")
     for old, new in zip(KEEPS[name][::2], KEEPS[name][1::2]):
@@ -131,7 +128,6 @@ def test_disks_of_the_scene_before_are_named(name: str, tmp_path: Path):
 
 @pytest.mark.parametrize("name", ["Exercise.js", "solver.py"])
 def test_new_solver_writes_two_functions_that_do_nothing(name: str, tmp_path: Path):
-    """It loads, every task can be asked, and none is right."""
     done = crosscheck("new-solver", name, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert crosscheck("new-solver", name, cwd=tmp_path).returncode == 2
@@ -141,7 +137,6 @@ def test_new_solver_writes_two_functions_that_do_nothing(name: str, tmp_path: Pa
 
 
 def test_a_box_is_told_where_four_walls_make_one():
-    """In any order and direction; three walls, or four that leave a gap, are none."""
     corners = [[0.0, 0.0], [4.0, 0.0], [4.0, 3.0], [0.0, 3.0]]
     walls = np.array([list(side) for side in zip(corners, corners[1:] + corners[:1])])
     assert box_of(walls) == box_of(walls[::-1, ::-1]) == [[0.0, 0.0], [4.0, 3.0]]
@@ -161,7 +156,6 @@ def test_a_box_is_told_where_four_walls_make_one():
     ],
 )
 def test_a_file_of_another_kind_says_what_to_do(name: str, hint: str, tmp_path: Path):
-    """In one sentence, also as an engine of a run."""
     (tmp_path / name).write_text("x")
     with pytest.raises(NotASolver, match=hint):
         read_solver(tmp_path / name)
@@ -171,7 +165,6 @@ def test_a_file_of_another_kind_says_what_to_do(name: str, hint: str, tmp_path: 
 
 
 def test_check_says_of_a_ported_engine_that_it_is_one(tmp_path: Path):
-    """Its functions are in a class."""
     assert crosscheck("new-engine", "a.py", "--y-down", cwd=tmp_path).returncode == 0
     done = crosscheck("check", "a.py", cwd=tmp_path)
     assert (done.returncode, "is an engine (create, step, read)" in done.stderr) == (2, True)
@@ -184,7 +177,6 @@ def test_check_says_of_a_ported_engine_that_it_is_one(tmp_path: Path):
 def test_a_new_world_that_read_cannot_read_is_named(
     name: str, begin: str, end: str, tmp_path: Path
 ):
-    """Not played as if nothing moved."""
     (tmp_path / name).write_text(stepping(begin, end, name))
     scene = scenario("head_on_equal_e09")
     run = play_once(row_of_file(tmp_path / name).make, "x:own", scene, scene.dt(1))
@@ -236,7 +228,6 @@ PLAIN = '--fields "x y u v r m" --collide hit --move go --per-frame 60 --pixels 
     ],
 )
 def test_a_ball_code_is_ported_by_hints_alone(name: str, hints: str, tmp_path: Path):
-    """Two disks that meet, and a crowd in a box, which keeps its energy."""
     source = ("--from", str(STRANGERS / name)) if name in HINTS else ()
     done = crosscheck("new-engine", name, *source, *shlex.split(hints), cwd=tmp_path)
     assert done.returncode == 0, done.stderr
@@ -275,7 +266,6 @@ def test_a_ball_code_is_ported_by_hints_alone(name: str, hints: str, tmp_path: P
     ],
 )
 def test_hints_that_do_not_fit_are_refused(hints: str, says: str, tmp_path: Path):
-    """In one sentence, and nothing is written."""
     done = crosscheck("new-engine", "a.py", *shlex.split(hints), cwd=tmp_path)
     assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
     assert says in done.stderr

@@ -71,8 +71,11 @@ main()
 """
 
 
+BALL = [0.0] * 9 + [1.0, 1.0, 1.0]
+QUESTION = {"spheres": [BALL], "calls": [["integrate", 0, 0.1]], "world": False}
+
+
 def choose_branch(monkeypatch: pytest.MonkeyPatch, branch: str) -> None:
-    """Which branch this process and its guests take, "kernel" or "portable"."""
     monkeypatch.setenv("CROSSCHECK_SYSTEM", branch)
     monkeypatch.setattr(system, "KERNEL", branch == "kernel")
 
@@ -80,10 +83,6 @@ def choose_branch(monkeypatch: pytest.MonkeyPatch, branch: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("platform", ["win32", pytest.param("darwin", marks=pytest.mark.long)])
 def test_a_class_is_marked_without_what_only_linux_has(tmp_path: Path, platform: str):
-    """JavaScript and Python, right and wrong, with Windows' line ends: the marks of Linux.
-
-    Everything is imported first; the control is a module that is not there.
-    """
     group = tmp_path / "class"
     for name in ("plain.js", "plain.py"):
         text = (ROOT / "tests" / "solvers" / "correct" / name).read_bytes()
@@ -91,16 +90,7 @@ def test_a_class_is_marked_without_what_only_linux_has(tmp_path: Path, platform:
             (group / f"{student} {name}").mkdir(parents=True)
             crlf = given.replace(b"\n", b"\r\n")
             (group / f"{student} {name}" / f"Exercise{name[-3:]}").write_bytes(crlf)
-    words = [
-        "check",
-        str(group),
-        "--format",
-        "csv",
-        "--out",
-        str(tmp_path / "here.csv"),
-        "--seed",
-        "0",
-    ]
+    words = ["check", group, "--format", "csv", "--seed", "0", "--out", tmp_path / "here.csv"]
     here = subprocess.run([CROSSCHECK, *words], capture_output=True, timeout=200)
     code = (ELSEWHERE + MARKED).replace("PLATFORM", platform).replace("CLASS", str(group))
     there = subprocess.run(
@@ -120,8 +110,6 @@ def test_a_class_is_marked_without_what_only_linux_has(tmp_path: Path, platform:
 
 @pytest.mark.slow
 def test_the_portable_branch_gives_the_same_bits(tmp_path: Path):
-    """Workers that connect, watchers in place of the kernel's limits: the same numbers, and the run
-    says which kind of limit held."""
     words = ["run", "head_on_equal_e09", "--timings", "0", "--engine", "reference:exercise"]
     here = crosscheck(*words, "--out", "kernel", cwd=tmp_path)
     elsewhere = subprocess.run(
@@ -147,7 +135,6 @@ LIMITS = {"kernel": "the kernel", "portable": "a thread that watches the process
 
 @pytest.mark.slow
 def test_a_bad_engine_ends_the_same_on_the_portable_branch():
-    """The tests of the workers and of hand-written solvers themselves, on the other branch."""
     chosen = "bad_cell and forkserver or limited_by_memory or what_a_file_does or ends_its_process"
     files = ["tests/reports/run/test_pool.py", "tests/adapters/test_own_solver.py"]
     done = subprocess.run(
@@ -167,7 +154,6 @@ def test_a_bad_engine_ends_the_same_on_the_portable_branch():
 def test_a_solver_that_takes_all_memory_in_one_call_into_c_is_ended(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    """No thread of it runs meanwhile, so that its parent ends it, before it has what it wants."""
     file = tmp_path / "solver.py"
     file.write_text("x = bytearray(10**10)\ndef integrate(s, dt): pass\n")
     choose_branch(monkeypatch, "portable")
@@ -182,17 +168,14 @@ def test_a_solver_that_takes_all_memory_in_one_call_into_c_is_ended(
 def test_an_endless_function_is_stopped_as_such(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, system_is: str
 ):
-    """Not as one that threw, which would be called again."""
     file = tmp_path / "solver.py"
     file.write_text(
         "def integrate(s, dt):\n    while True:\n        pass\n\n"
         "def sphereSphereCollisionHandling(a, b):\n    pass\n"
     )
     choose_branch(monkeypatch, system_is)
-    ball = [0.0] * 9 + [1.0, 1.0, 1.0]
-    question = {"spheres": [ball], "calls": [["integrate", 0, 0.1]], "world": False}
     with SolverProcess(read_solver(file)) as solver:
-        first, again = solver.request([("ask", question, 1.0)] * 2)
+        first, again = solver.request([("ask", QUESTION, 1.0)] * 2)
 
     assert first.kind == "timeout"
     assert str(first) == str(again) == "does not come back within 1 s in one call"
@@ -203,14 +186,12 @@ def test_an_endless_function_is_stopped_as_such(
 def test_a_child_in_a_group_of_its_own_ends_with_its_solver(
     tmp_path: Path, environment: dict[str, str]
 ):
-    """setsid leaves the group that the kernel ends at once."""
     assert not lives_on(tmp_path, environment, "os.setsid()", "pass")
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("child_does", ["pass", "os.closerange(0, 100)"])
 def test_a_child_ends_with_its_solver_that_has_ended_itself(tmp_path: Path, child_does: str):
-    """Whether or not it keeps the pipe open, so that its parent's end is not seen by it."""
     assert not lives_on(tmp_path, os.environ, child_does, "os._exit(0)")
 
 
@@ -218,7 +199,6 @@ def test_a_child_ends_with_its_solver_that_has_ended_itself(tmp_path: Path, chil
 def test_a_solver_that_has_ended_itself_is_said_to_have_though_its_child_keeps_the_pipe(
     tmp_path: Path,
 ):
-    """Not that it does not come back, half a minute later."""
     (tmp_path / "solver.py").write_text(
         "import os, time\nif os.fork() == 0:\n    time.sleep(300)\nos._exit(0)\n"
     )
@@ -280,7 +260,6 @@ def is_forked(process: psutil.Process) -> bool:
 
 
 def test_a_second_process_is_refused_the_lock(tmp_path: Path):
-    """Also of one process: the lock is of the open file."""
     one, other = (os.open(tmp_path / "file", os.O_RDWR | os.O_CREAT) for _ in range(2))
     system.lock(one)
     with pytest.raises(BlockingIOError):
@@ -293,7 +272,6 @@ def test_a_second_process_is_refused_the_lock(tmp_path: Path):
 def test_windows_locks_a_byte_behind_all_that_is_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    """So that others may read the file meanwhile; that it is locked is said as on other systems."""
     asked: list[Sequence[int]] = []
 
     def locking(file: int, mode: int, count: int) -> None:
@@ -317,7 +295,6 @@ def test_windows_locks_a_byte_behind_all_that_is_written(
 
 
 def windows() -> SimpleNamespace:
-    """The module `os`, which says that it is of Windows."""
     return SimpleNamespace(**{**vars(os), "name": "nt"})
 
 
@@ -325,16 +302,13 @@ def windows() -> SimpleNamespace:
 def test_a_thread_ends_a_solver_that_takes_all_memory(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    """It ends alone, with the status that the kernel's limit gives it elsewhere."""
     file = tmp_path / "solver.py"
     file.write_text(
         "held = []\n\ndef integrate(s, dt):\n    while True:\n        held.append(bytearray(10**8))"
         "\n\ndef sphereSphereCollisionHandling(a, b):\n    pass\n"
     )
     choose_branch(monkeypatch, "portable")
-    ball = [0.0] * 9 + [1.0, 1.0, 1.0]
-    question = {"spheres": [ball], "calls": [["integrate", 0, 0.1]], "world": False}
     with SolverProcess(read_solver(file)) as solver, pytest.raises(SolverFailed) as failed:
-        solver.do("ask", question, 20.0)
+        solver.do("ask", QUESTION, 20.0)
 
     assert failed.value.kind == "memory"

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from crosscheck2d.adapters.advance import off_grid, off_grid_note
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.adapters.play import play
-from crosscheck2d.adapters.thrust_grid import off_grid, off_grid_note
 from crosscheck2d.scenarios.files.scene_file import scene_text
 from crosscheck2d.scenarios.model import Scenario, Scene, Thrust
 from crosscheck2d.scenarios.truth.exact import with_oracle
@@ -19,7 +19,6 @@ EXACT = ("reference:ordered", "event_driven:float64")  # they are right to round
 
 
 def thrown(start: float, stop: float, torque: float = 0.0) -> Scenario:
-    """A disk in free flight with a thrust."""
     scene = Scene(position=[[0, 0]], velocity=[[1, 0]], radius=[0.25], mass=[2], restitution=1)
     one = Scenario(
         "thrown",
@@ -49,8 +48,6 @@ def largest_off(one: Scenario, name: str, dt: float) -> float:
     ("start", "stop"), [(0.23, 0.6), (0.2, 0.57), (0.2, 2.0), (0.23, 0.57), (0.21, 0.24)]
 )
 def test_an_exact_engine_is_off_by_no_more_than_is_said(name: str, start: float, stop: float):
-    """By just that where one end alone is inside a step; a thrust on the grid, the control, costs
-    nothing."""
     one = thrown(start, stop)
     for dt in map(one.dt, one.substeps):
         measured, said = largest_off(one, name, dt), off_grid(one, dt)
@@ -63,7 +60,6 @@ def test_an_exact_engine_is_off_by_no_more_than_is_said(name: str, start: float,
 
 
 def test_a_torque_turns_the_rim_likewise():
-    """Beside the force, which the bound adds."""
     with_torque, without = thrown(0.23, 0.6, torque=0.5), thrown(0.23, 0.6)
     twice = 0.5 / with_torque.scene.inertia[0] * 0.1**2 * 0.3 * 0.7 / 2
 
@@ -72,7 +68,6 @@ def test_a_torque_turns_the_rim_likewise():
 
 
 def test_the_note_names_the_steps_at_which_it_happens():
-    """At dt = 0.1 s, not at 0.05 s; and nothing is noted where none does."""
     note = off_grid_note(thrown(0.2, 0.55))
 
     assert note.startswith("a thrust starts or stops inside a step: every engine is off by up to ")
@@ -85,7 +80,6 @@ def test_the_note_names_the_steps_at_which_it_happens():
     ("stop", "noted"), [(0.55, True), pytest.param(0.6, False, marks=pytest.mark.slow)]
 )
 def test_the_page_and_the_terminal_say_so(tmp_path: Path, stop: float, noted: bool):
-    """With the scene; a scene on the grid has no such remark."""
     (tmp_path / "thrown.toml").write_text(scene_text(thrown(0.2, stop)))
     done = crosscheck(
         "run", "thrown.toml", "--engine", "reference:ordered", "--out", "mine", cwd=tmp_path

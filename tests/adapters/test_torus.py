@@ -3,7 +3,6 @@ exercise."""
 
 from __future__ import annotations
 
-from contextlib import closing
 from math import isnan
 
 import numpy as np
@@ -16,7 +15,7 @@ from crosscheck2d.adapters.engines import FETCHED, UNASKED, row_of
 from crosscheck2d.adapters.mechanisms.ablated import AblatedReference
 from crosscheck2d.adapters.mechanisms.table import EDGES, mechanisms_of, with_mechanisms
 from crosscheck2d.adapters.npm_packages import missing
-from crosscheck2d.adapters.play import play
+from crosscheck2d.adapters.play import play, play_once
 from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.compare.laws import deviation
 from crosscheck2d.reports.compare.metrics import METRICS
@@ -30,7 +29,7 @@ ENGINES = [name for name in (*UNASKED, *FETCHED) if name != "matter:shipped"]
 
 
 def torus(**changed: object) -> Scenario:
-    """A disk in free flight on a torus of 4 m, as `torus_flight.toml`."""
+    # A disk in free flight on a torus of 4 m, as `torus_flight.toml`.
     disks = {
         "position": [[0.3, -0.4]],
         "velocity": [[SPEED, -1.7]],
@@ -44,11 +43,9 @@ def torus(**changed: object) -> Scenario:
 
 
 def run_of(name: str, scenario: Scenario, substeps: int) -> Run:
-    """A run on a fresh engine; skipped if its npm package is not there, or it refuses the scene."""
     if name in FETCHED and (reason := missing(FETCHED[name].package)):
         pytest.skip(reason)
-    with closing(row_of(name).make()) as engine:
-        run = play(engine, name, scenario, scenario.dt(substeps))
+    run = play_once(row_of(name).make, name, scenario, scenario.dt(substeps))
     if run.status == "unsupported":
         pytest.skip(run.reason)
     assert run.trajectory is not None, run.reason
@@ -58,7 +55,6 @@ def run_of(name: str, scenario: Scenario, substeps: int) -> Run:
 @pytest.mark.parametrize("substeps", [1, 2, 4])
 @pytest.mark.parametrize("name", ENGINES)
 def test_free_flight_on_a_torus_is_exact_at_every_step_size(name: str, substeps: int):
-    """But for the exercise, whose flight is cut off at every edge."""
     flight = torus()
     assert flight.truth is not None
     run, steps = run_of(name, flight, substeps), END / SAMPLE * substeps
@@ -77,7 +73,6 @@ def test_free_flight_on_a_torus_is_exact_at_every_step_size(name: str, substeps:
 @pytest.mark.parametrize("substeps", [1, 2, 4])
 @pytest.mark.parametrize("name", ["reference:exercise", "pymunk:matched", "box2d:matched"])
 def test_a_collision_after_an_edge_is_judged_as_any_other(name: str, substeps: int):
-    """Disk 0 leaves, comes in opposite and meets disk 1: one collision, with the stated e."""
     scenario = torus(
         position=[[1.5, 0.0], [-1.0, 0.05]],
         velocity=[[2.03, 0.1], [0.0, 0.0]],
@@ -104,7 +99,6 @@ def test_a_collision_after_an_edge_is_judged_as_any_other(name: str, substeps: i
 def test_a_coordinate_is_shifted_by_whole_boxes_until_it_is_inside(
     x: float, low: float, side: float
 ):
-    """However far it has flown beyond the edge in one step; inside it stays to the bit."""
     high = low + side
     there = onto_torus(x, low, high)
     rounding = 4 * 2.0**-53 * (abs(x) + abs(low) + side) * max(1.0, abs(x - low) / side)
@@ -117,12 +111,10 @@ def test_a_coordinate_is_shifted_by_whole_boxes_until_it_is_inside(
 
 @pytest.mark.parametrize("x", [float("inf"), float("-inf"), float("nan")])
 def test_what_is_no_number_is_left_to_be_found_as_such(x: float):
-    """It is not set onto an edge, where nothing could be seen of it."""
     assert isnan(onto_torus(x, -2.0, 2.0))
 
 
 def test_the_cut_at_the_edge_is_a_mechanism_of_the_exercise_alone():
-    """Enabled it explains the error of the exercise to the bit; without it nothing is left."""
     flight = torus()
     ours = run_of("reference:exercise", flight, 1)
     mechanisms = mechanisms_of("reference:exercise", {}, flight.scene, ours.dt)

@@ -12,7 +12,7 @@ import pyb2d3
 import pymunk
 import pytest
 
-from crosscheck2d.adapters.npm_packages import missing, pinned, place
+from crosscheck2d.adapters.npm_packages import missing, pinned, pinned_library
 
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "adapters" / "README.md").read_text(encoding="utf-8")
@@ -25,7 +25,6 @@ RELEASES = dict(
 
 
 def test_the_table_has_the_pinned_versions_and_the_days_of_their_release():
-    """Those of PyPI are in uv.lock, too."""
     lock = tomllib.loads((ROOT / "uv.lock").read_text(encoding="utf-8"))
     locked = {package["name"]: package for package in lock["package"]}
     npm = pinned()["dependencies"]
@@ -39,7 +38,6 @@ def test_the_table_has_the_pinned_versions_and_the_days_of_their_release():
 
 
 def test_pyb2d3_hands_on_none_of_what_box2d_3_has():
-    """Negative control: what it does hand on is found by the same names."""
     assert not hasattr(pyb2d3.BodyDef(), "allow_fast_rotation")
     assert hasattr(pyb2d3.BodyDef(), "fixed_rotation")
     names = " ".join(dir(pyb2d3.World)).lower()
@@ -48,13 +46,11 @@ def test_pyb2d3_hands_on_none_of_what_box2d_3_has():
 
 
 def test_box2d_py_has_copies_of_what_is_compiled_in():
-    """They are numbers of the module; whatever they are set to, the cap stays."""
     assert (Box2D.b2_maxTranslation, Box2D.b2_velocityThreshold) == (2.0, 1.0)
     assert Box2D.b2_maxRotation == pytest.approx(1.5707964)
 
 
 def test_pymunk_has_neither_ccd_nor_a_switch_for_warm_starting():
-    """By the names of a space and of a body."""
     names = " ".join([*dir(pymunk.Space), *dir(pymunk.Body)]).lower()
     assert not [word for word in ("warm", "bullet", "continuous", "ccd") if word in names]
     assert "sleep" in names
@@ -65,8 +61,7 @@ RAPIER = "@dimforge/rapier2d-compat"
 
 @pytest.mark.skipif(bool(missing(RAPIER)), reason=missing(RAPIER))
 def test_the_npm_package_of_rapier_does_not_hand_on_the_cap_on_speed():
-    """The declarations of all that its integration parameters have."""
-    dist = place() / "node_modules" / RAPIER / "dist" / "dynamics"
-    text = (dist / "integration_parameters.d.ts").read_text(encoding="utf-8").lower()
+    dynamics = pinned_library(RAPIER).folder / "dist" / "dynamics"
+    text = (dynamics / "integration_parameters.d.ts").read_text(encoding="utf-8").lower()
     assert "velocity" not in text
     assert "lengthunit" in text

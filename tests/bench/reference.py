@@ -32,7 +32,7 @@ from crosscheck2d.adapters.box2d_v3 import Box2DV3
 from crosscheck2d.adapters.pymunk import Pymunk
 from crosscheck2d.adapters.reference import Reference
 from crosscheck2d.reference_impl import exercise, neighbours, ordered
-from crosscheck2d.reports.run.machine import about, busy_cores
+from crosscheck2d.reports.run.cells import about, busy_cores
 from crosscheck2d.scenarios.model import Scene
 from tests.adapters.event_driven.gases import boxed_asteroids, boxed_gas
 from tests.bench.events import alone

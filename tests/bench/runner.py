@@ -19,12 +19,11 @@ import numpy as np
 
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.reports.run.cells import Cell, scene_hash
-from crosscheck2d.reports.run.plan import Means, RunPlan, RunTask
 from crosscheck2d.reports.run.playing import play_here
 from crosscheck2d.reports.run.pool import run_all
 from crosscheck2d.reports.run.results import COMMAND, RunResults
 from crosscheck2d.reports.run.store import writing
-from crosscheck2d.reports.run.suite import Suite, carry_out
+from crosscheck2d.reports.run.suite import Means, RunPlan, RunTask, carry_out, store_cell
 from crosscheck2d.reports.run.tables import make_tables
 from crosscheck2d.reports.terminal.progress import Progress
 from crosscheck2d.scenarios.catalogue import scenario
@@ -53,22 +52,13 @@ def played(
         cell: partial(play_here, cell, ENGINES[cell.engine], questions[cell.scene])
         for cell in cells
     }
-    plan = RunPlan(
-        list(scenarios),
-        {cell.engine: ENGINES[cell.engine] for cell in cells},
-        0,
-        [],
-        False,
-        0,
-        "bench",
-    )
     inside, started, before = 0.0, perf_counter(), sum(processor())
     with writing(folder / "out", COMMAND) as store, Progress() as progress:
         progress.start(len(tasks), len(tasks))
-        suite = Suite(plan, Means(workers), store, scenarios, progress)
         for cell, result in run_all(tasks, workers, timeout=3600.0):
             key = cell.key(scene_hash(scenarios[cell.scene]), "")
-            record = suite.keep_cell(RunTask("cell", key, cell), result)
+            task = RunTask("cell", key, cell)
+            record = store_cell(store, task, scenarios[cell.scene], result, 3600.0, progress)
             assert record["status"] == "ok", record["reason"]
             inside += record["seconds"]
     return Cost(perf_counter() - started, inside, sum(processor()) - before)

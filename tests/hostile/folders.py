@@ -16,12 +16,12 @@ from tests.hostile.small_run import RUN, TWO, copied
 
 PLAIN = (Path(__file__).parent.parent / "solvers" / "correct" / "plain.py").read_text()
 SCENE = {"two.toml": TWO}
-OUT: dict[str, tuple[str, ...]] = {
-    "run": ("run", "two.toml", "--engine", "pymunk:shipped", "--out"),
-    "speed": ("speed", "free_fall", "--engine", "pymunk:shipped", "--out"),
-    "stability": ("stability", "slow_collision", "--engine", "pymunk:shipped", "--out"),
-    "tune": ("tune", "pymunk", "--out"),
-    "lesson": ("lesson", "--export"),
+OUT = {
+    "run": "run two.toml --engine pymunk:shipped --out",
+    "speed": "speed free_fall --engine pymunk:shipped --out",
+    "stability": "stability slow_collision --engine pymunk:shipped --out",
+    "tune": "tune pymunk --out",
+    "lesson": "lesson --export",
 }
 # Somebody's folder: what is in it.
 FOREIGN: dict[str, dict[str, str | bytes]] = {
@@ -42,7 +42,7 @@ FOREIGN: dict[str, dict[str, str | bytes]] = {
 TAKEN = tuple(
     Input(
         f"{command} into a folder with {what}",
-        (*words, "out"),
+        f"{words} out",
         SCENE | files,
         says="is damaged" if "another program" in what else "out",
     )
@@ -56,12 +56,10 @@ Prepare = Callable[[Path], object]
 
 
 def link(to: str, here: Path) -> None:
-    """`out` leads there."""
     (here / "out").symlink_to(to)
 
 
 def bound(here: Path) -> None:
-    """A socket of the file system."""
     with contextlib.chdir(here), socket.socket(socket.AF_UNIX) as one:  # whose path may not be long
         one.bind("out")
 
@@ -86,7 +84,7 @@ PATHS: dict[str, tuple[str, Prepare | None]] = {
 NO_PLACE = tuple(
     Input(
         f"{command} into {what}",
-        (*OUT[command], path),
+        f"{OUT[command]} {path}",
         SCENE,
         prepare=prepare,
         says=path.strip("./")[:20] or "is the current folder",
@@ -100,25 +98,17 @@ NO_PLACE = tuple(
 
 
 def note(name: str, here: Path) -> None:
-    """The user has put something there."""
     path = here / name
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text("years of work")
 
 
-def moved(name: str, to: str, here: Path) -> None:
-    """What is there is elsewhere now."""
-    (here / name).rename(here / to)
-
-
-def moved_and_linked(name: str, here: Path) -> None:
-    """As people do when a disk is full."""
-    moved(name, "elsewhere", here)
-    (here / name).symlink_to(here / "elsewhere")
+def moved_and_linked(here: Path) -> None:
+    (here / "out").rename(here / "elsewhere")
+    (here / "out").symlink_to(here / "elsewhere")
 
 
 def held(here: Path) -> None:
-    """Another process writes there, until this one has been played."""
     HELD.append(file := (here / "out" / ".crosscheck.lock").open("ab"))
     fcntl.flock(file, fcntl.LOCK_EX)
 
@@ -127,27 +117,26 @@ HELD: list[object] = []
 
 
 def damaged(here: Path) -> None:
-    """The file of the rows is torn."""
     path = here / "out" / "results.sqlite"
     path.write_bytes(path.read_bytes()[:20_000])
 
 
 def edited(here: Path) -> None:
-    """Every row is another."""
     file = sqlite3.connect(here / "out" / "results.sqlite")
     file.execute("update results set value = '{}' where kind = 'cell'")
     file.commit()
     file.close()
 
 
-AGAIN = (*RUN, "--out", "out")
-REPORT = ("report", "out")
+AGAIN = f"{RUN} --out out"
+REPORT = "report out"
+done = partial(Input, codes=(0,), writes=("out",), says="2 cells ended")
 OURS = (
     *(
         Input(
-            f"{what}, {words[1]}",
+            f"{what}, {words.split()[1]}",
             words,
-            prepare=copied("out", then=partial(note, f"out/{path}")),
+            prepare=copied(partial(note, f"out/{path}")),
             says="holds",
         )
         for what, path in {
@@ -162,19 +151,16 @@ OURS = (
     Input(
         "a run that is a link to a run",
         AGAIN,
-        prepare=copied("out", then=partial(moved_and_linked, "out")),
+        prepare=copied(moved_and_linked),
         codes=(0,),
         writes=("elsewhere", "out"),
         says="2 cells ended",
     ),
     Input(
-        "a run that another process writes",
-        AGAIN,
-        prepare=copied("out", then=held),
-        says="another crosscheck",
+        "a run that another process writes", AGAIN, prepare=copied(held), says="another crosscheck"
     ),
     *(
-        Input(f"a run that is {what}, {words[0]}", words, prepare=copied("out", then=how), **ends)
+        Input(f"a run that is {what}, {words.split()[0]}", words, prepare=copied(how), **ends)
         for what, how, words, ends in (
             ("damaged", damaged, AGAIN, {"says": "is damaged"}),
             ("damaged", damaged, REPORT, {"says": "is damaged"}),
@@ -182,132 +168,90 @@ OURS = (
             ("edited", edited, REPORT, {"says": "is not what was written"}),
         )
     ),
-    Input(
-        "a run again",
-        AGAIN,
-        prepare=copied("out"),
-        codes=(0,),
-        writes=("out",),
-        says="2 cells ended",
-    ),
-    Input(
+    done("a run again", AGAIN, prepare=copied()),
+    done(
         "a run into a folder that is empty",
         AGAIN,
         SCENE,
         prepare=lambda here: (here / "out").mkdir(),
-        codes=(0,),
-        writes=("out",),
-        says="2 cells ended",
     ),
     Input(
         "a run of a scene in the folder's own scenes",
-        ("run", "out/scenes/a.toml", "--out", "out"),
+        "run out/scenes/a.toml --out out",
         {"out/scenes/a.toml": TWO},
         says="holds scenes",
     ),
     Input(
-        "speed into a run",
-        (*OUT["speed"], "out"),
-        prepare=copied("out"),
-        says="made by crosscheck run",
+        "speed into a run", f"{OUT['speed']} out", prepare=copied(), says="made by crosscheck run"
     ),
     Input(
         "stability into a run",
-        (*OUT["stability"], "out"),
-        prepare=copied("out"),
+        f"{OUT['stability']} out",
+        prepare=copied(),
         says="made by crosscheck run",
     ),
-    Input(
-        "tune into a run",
-        (*OUT["tune"], "out"),
-        prepare=copied("out"),
-        says="made by crosscheck run",
-    ),
+    Input("tune into a run", f"{OUT['tune']} out", prepare=copied(), says="made by crosscheck run"),
     Input(
         "a run into where the current folder is",
-        (*RUN, "--out", "../here"),
+        f"{RUN} --out ../here",
         SCENE,
         says="is the current folder",
     ),
 )
 
-NO_RUN: dict[str, tuple[tuple[str, ...], dict[str, str | bytes], str]] = {
+NO_RUN: dict[str, tuple[str, dict[str, str | bytes], str]] = {
     "run: a folder of the old format": (AGAIN, {"out/journal.jsonl": "{}"} | SCENE, "earlier"),
     "report: a folder of the old format": (REPORT, {"out/journal.jsonl": "{}"}, "earlier"),
-    "report: nothing there": (("report", "out"), {}, "results.sqlite"),
-    "report: a file": (("report", "two.toml"), SCENE, "two.toml"),
-    "report: a folder of the user's": (
-        ("report", "out"),
-        {"out/report.html": "mine"},
-        "results.sqlite",
-    ),
-    "diff: nothing there": (("diff", "a", "b"), {}, "a"),
-    "diff: two files": (("diff", "a", "b"), {"a": "1", "b": "2"}, "a"),
-    "diff: a folder of the user's": (
-        ("diff", "a", "a"),
-        {"a/deviations.csv": "mine"},
-        "results.sqlite",
-    ),
-    "check --page: another page": (
-        ("check", "plain.py", "--page", "a.html"),
-        {"a.html": "mine"},
-        "no page",
-    ),
-    "check --page: a folder": (("check", "plain.py", "--page", "a"), {"a/b": "mine"}, "a"),
-    "check --page: below a file": (
-        ("check", "plain.py", "--page", "plain.py/a.html"),
-        {},
-        "plain.py/a.html",
-    ),
-    "check --page: the solver itself": (("check", "plain.py", "--page", "plain.py"), {}, "no page"),
+    "report: nothing there": ("report out", {}, "results.sqlite"),
+    "report: a file": ("report two.toml", SCENE, "two.toml"),
+    "report: a folder of the user's": ("report out", {"out/report.html": "mine"}, "results.sqlite"),
+    "diff: nothing there": ("diff a b", {}, "a"),
+    "diff: two files": ("diff a b", {"a": "1", "b": "2"}, "a"),
+    "diff: a folder of the user's": ("diff a a", {"a/deviations.csv": "mine"}, "results.sqlite"),
+    "check --page: another page": ("check plain.py --page a.html", {"a.html": "mine"}, "no page"),
+    "check --page: a folder": ("check plain.py --page a", {"a/b": "mine"}, "a"),
+    "check --page: below a file": ("check plain.py --page plain.py/a.html", {}, "plain.py/a.html"),
+    "check --page: the solver itself": ("check plain.py --page plain.py", {}, "no page"),
     "check --page: a folder that is not there": (
-        ("check", "plain.py", "--page", "no/a.html"),
+        "check plain.py --page no/a.html",
         {},
         "no/a.html",
     ),
     "check --page: the page of the user's that is there": (
-        ("check", "plain.py"),
+        "check plain.py",
         {"check.html": "mine"},
         "no page",
     ),
     "check --junit: another file": (
-        ("check", "plain.py", "--junit", "a.xml"),
+        "check plain.py --junit a.xml",
         {"a.xml": "<mine/>"},
         "no JUnit",
     ),
     "check --junit: a page of ours": (
-        ("check", "plain.py", "--junit", "a.xml"),
+        "check plain.py --junit a.xml",
         {"a.xml": '<meta name="generator" content="crosscheck check">'},
         "no JUnit",
     ),
-    "check --junit: where the page goes": (
-        ("check", "plain.py", "--junit", "a", "--page", "./a"),
-        {},
-        "page goes",
-    ),
-    "check: nothing there": (("check", "nothing.py"), {}, "nothing.py"),
+    "check --junit: where the page goes": ("check plain.py --junit a --page ./a", {}, "page goes"),
+    "check: nothing there": ("check nothing.py", {}, "nothing.py"),
     "check: an empty folder's file": (
-        ("check", "a"),
+        "check a",
         {"a/readme.md": "mine"},
         "holds no .js and no .py",
     ),
     "lesson --export: another page": (
-        ("lesson", "order", "--export", "a.html"),
+        "lesson order --export a.html",
         {"a.html": "mine"},
         "no page",
     ),
     "lesson --export: a folder for one lesson": (
-        ("lesson", "order", "--export", "a"),
+        "lesson order --export a",
         {"a/b": "1"},
         "is a folder",
     ),
-    "lesson --export: below a file": (
-        ("lesson", "order", "--export", "a/b.html"),
-        {"a": "mine"},
-        "a/b.html",
-    ),
+    "lesson --export: below a file": ("lesson order --export a/b.html", {"a": "mine"}, "a/b.html"),
     "lesson --export: a device that is full": (
-        ("lesson", "order", "--export", "/proc/a.html"),
+        "lesson order --export /proc/a.html",
         {},
         "/proc/a.html",
     ),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from functools import partial
 from pathlib import Path
 
 from tests.hostile.played import Input
@@ -12,18 +13,7 @@ PY = (Path(__file__).parent.parent / "solvers" / "correct" / "plain.py").read_te
 ASKS = TWO.replace("Does a head-on", "Хранит ли 保存 Does a")
 OPEN = ASKS[: ASKS.index("[[wall]]")]  # the exercise's functions know no walls
 FILES = {"two.toml": ASKS, "plain.py": PY}
-RUN = (
-    "run",
-    "two.toml",
-    "--engine",
-    "pymunk:shipped",
-    "--dt",
-    "0.02",
-    "--out",
-    "out",
-    "--workers",
-    "1",
-)
+RUN = "run two.toml --engine pymunk:shipped --dt 0.02 --out out --workers 1"
 WRITES = ("out", "out.part", "check.html", "order.html", "printed")
 NOT_UTF8 = os.fsdecode(b"caf\xe9")
 ODD = "Ünï 保存 [/nope]"
@@ -38,70 +28,61 @@ PLACES_OF_ALL: dict[str, dict[str, str]] = {
     "a width that is no number": {"COLUMNS": "wide"},
     "a home that is not there": {"HOME": "/nonexistent", "XDG_CACHE_HOME": "/nonexistent"},
 }
-COMMANDS: dict[str, tuple[tuple[str, ...], tuple[int, ...]]] = {
-    "truth": (("truth", "two.toml"), (0,)),
-    "list": (("list", "metrics"), (0,)),
-    "a refusal": (("truth", "nothing_保存.toml"), (2,)),
+COMMANDS: dict[str, tuple[str, tuple[int, ...]]] = {
+    "truth": ("truth two.toml", (0,)),
+    "list": ("list metrics", (0,)),
+    "a refusal": ("truth nothing_保存.toml", (2,)),
 }
+right = partial(Input, codes=(0,), writes=WRITES)
 TURNED = [
     Input(f"{what}: {place}", words, FILES, environment=environment, codes=codes, writes=WRITES)
     for place, environment in PLACES_OF_ALL.items()
     for what, (words, codes) in COMMANDS.items()
 ]
 WHOLE = [
-    Input(
+    right(
         "run: the plainest locale",
         RUN,
         FILES,
         environment=PLACES_OF_ALL["the plainest locale"],
-        codes=(0,),
-        writes=WRITES,
         says="1 cell ended",
     ),
-    Input(
+    right(
         "run: streams in ASCII",
         RUN,
         FILES,
         environment={"PYTHONIOENCODING": "ascii"},
-        codes=(0,),
-        writes=WRITES,
         says="1 cell ended",
     ),
-    Input(
+    right(
         "check: the plainest locale",
-        ("check", "plain.py"),
+        "check plain.py",
         FILES,
         environment=PLACES_OF_ALL["the plainest locale"],
-        codes=(0,),
-        writes=WRITES,
     ),
-    Input(
+    right(
         "check: streams in ASCII, for programs",
-        ("check", "plain.py", "--json"),
+        "check plain.py --json",
         FILES,
         environment={"PYTHONIOENCODING": "ascii"},
-        codes=(0,),
-        writes=WRITES,
     ),
     Input(
         "truth: streams in ASCII, for programs",
-        ("truth", "two.toml", "--json"),
+        "truth two.toml --json",
         FILES,
         environment={"PYTHONIOENCODING": "ascii"},
         codes=(0,),
     ),
-    Input(
+    right(
         "report: streams in ASCII",
-        ("report", "out"),
-        prepare=copied("out"),
+        "report out",
+        prepare=copied(),
         environment={"PYTHONIOENCODING": "ascii"},
-        codes=(0,),
-        writes=WRITES,
     ),
     Input(
         "diff: streams in ASCII",
-        ("diff", "out", "out"),
-        prepare=copied("out"),
+        "diff out out",
+        prepare=copied(),
         environment={"PYTHONIOENCODING": "ascii"},
         codes=(0,),
     ),
@@ -118,7 +99,7 @@ INTERPRETER_OPTIONS: dict[str, tuple[dict[str, str], tuple[int, ...]]] = {
     "with a path of nothing": ({"PYTHONPATH": ":::/nonexistent:"}, (0,)),
 }
 WITH_OPTIONS = [
-    Input(f"truth: {what}", ("truth", "two.toml"), FILES, environment=environment, codes=codes)
+    Input(f"truth: {what}", "truth two.toml", FILES, environment=environment, codes=codes)
     for what, (environment, codes) in INTERPRETER_OPTIONS.items()
 ]
 TRAP = "open('trapped.txt', 'w').write('foreign code ran')\n"
@@ -128,26 +109,22 @@ SHADOWS = {
 PATHS = [
     Input(
         "truth: an empty entry in the path, beside modules of Python's names",
-        ("truth", "two.toml"),
+        "truth two.toml",
         FILES | {"random.py": TRAP, "secrets.py": TRAP, "scenarios.py": TRAP},
         environment={"PYTHONPATH": ":"},
         codes=(0,),
     ),
-    Input(
+    right(
         "run: an empty entry in the path, beside modules of Python's names",
         RUN,
         FILES | {"random.py": TRAP, "secrets.py": TRAP, "scenarios.py": TRAP},
         environment={"PYTHONPATH": ":"},
-        codes=(0,),
-        writes=WRITES,
     ),
-    Input(
+    right(
         "check: a path that leads to where one is",
-        ("check", "plain.py"),
+        "check plain.py",
         FILES | {"random.py": TRAP, "numbers.py": TRAP},
         environment={"PYTHONPATH": "."},
-        codes=(0,),
-        writes=WRITES,
     ),
 ]
 # What a path may be called that is no UTF-8, or more than letters.
@@ -164,7 +141,15 @@ NAMES = [
         for what, words in {
             "truth": ("truth", f"{name}/two.toml"),
             "check": ("check", f"{name}/plain.py"),
-            "run": ("run", f"{name}/two.toml", *RUN[2:6], "--out", f"{name}/out", "--workers", "1"),
+            "run": (
+                "run",
+                f"{name}/two.toml",
+                *RUN.split()[2:6],
+                "--out",
+                f"{name}/out",
+                "--workers",
+                "1",
+            ),
             "a solver as engine": (
                 "run",
                 f"{name}/two.toml",
@@ -179,12 +164,10 @@ NAMES = [
             ),
         }.items()
     ),
-    Input(
+    right(
         "check: a class in a folder in bytes",
         ("check", NOT_UTF8),
         {f"{NOT_UTF8}/{NOT_UTF8}/plain.py": PY, f"{NOT_UTF8}/b/plain.py": PY},
-        codes=(0,),
-        writes=WRITES,
     ),
     Input(
         "check: results in files in bytes",
@@ -207,14 +190,14 @@ LINES: dict[str, tuple[str, tuple[int, ...], str]] = {
     "list: a full disk": ("$crosscheck list > /dev/full", (1,), REFUSED),
     "help: a full disk": ("$crosscheck run --help > /dev/full", (1,), REFUSED),
     "check: a full disk": ("$crosscheck check plain.py > /dev/full", (1,), REFUSED),
-    "run: a full disk": (f"$crosscheck {' '.join(RUN)} > /dev/full", (1,), REFUSED),
+    "run: a full disk": (f"$crosscheck {RUN} > /dev/full", (1,), REFUSED),
     "truth: no output": ("$crosscheck truth two.toml >&-", (1,), ""),
     "list: no output": ("$crosscheck list >&-", (1,), ""),
-    "run: no output": (f"$crosscheck {' '.join(RUN)} >&-", (1,), ""),
+    "run: no output": (f"$crosscheck {RUN} >&-", (1,), ""),
     "truth: no error output": ("$crosscheck truth two.toml 2>&-", (0,), "horizon"),
-    "run: no error output": (f"$crosscheck {' '.join(RUN)} 2>&-", (0,), "1 cell ended"),
+    "run: no error output": (f"$crosscheck {RUN} 2>&-", (0,), "1 cell ended"),
     "truth: no input": ("$crosscheck truth two.toml <&-", (0,), "horizon"),
-    "run: no input": (f"$crosscheck {' '.join(RUN)} <&-", (0,), "1 cell ended"),
+    "run: no input": (f"$crosscheck {RUN} <&-", (0,), "1 cell ended"),
     "check: no stream at all": ("$crosscheck check plain.py <&- >&- 2>&-; test $? -le 1", (0,), ""),
     "truth: error output on a full disk": (
         "$crosscheck truth two.toml 2> /dev/full",
@@ -224,16 +207,8 @@ LINES: dict[str, tuple[str, tuple[int, ...], str]] = {
     "a refusal on a full disk": ("$crosscheck truth no.toml 2> /dev/full; test $? -eq 2", (0,), ""),
     "truth: nobody reads on": ("$crosscheck truth two.toml --events | head -1", (0,), ""),
     "list: nobody reads at all": ("$crosscheck list | true", (0,), ""),
-    "run: nobody reads at all": (
-        f"$crosscheck {' '.join(RUN)} | true; test -e out/report.html",
-        (0,),
-        "",
-    ),
-    "run: a folder that is gone": (
-        f"mkdir a; cd a; rmdir ../a; $crosscheck {' '.join(RUN)}",
-        (2,),
-        "",
-    ),
+    "run: nobody reads at all": (f"$crosscheck {RUN} | true; test -e out/report.html", (0,), ""),
+    "run: a folder that is gone": (f"mkdir a; cd a; rmdir ../a; $crosscheck {RUN}", (2,), ""),
     "truth: a folder that is gone": (
         "mkdir a; cd a; rmdir ../a; $crosscheck truth slow_collision",
         (0,),
@@ -244,11 +219,7 @@ LINES: dict[str, tuple[str, tuple[int, ...], str]] = {
         (2,),
         "",
     ),
-    "run: files of no more than 100 kB": (
-        f"ulimit -f 100; $crosscheck {' '.join(RUN)}",
-        (1, 2),
-        "",
-    ),
+    "run: files of no more than 100 kB": (f"ulimit -f 100; $crosscheck {RUN}", (1, 2), ""),
     "truth: three files at once": ("ulimit -n 12; $crosscheck truth two.toml", (0, 1, 2), ""),
     "truth: signalled to stop": (
         "timeout -s TERM 0.3 $crosscheck truth two.toml; test $? -eq 124",

@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import os
 import re
+import shlex
 import signal
 import stat
 import subprocess
@@ -78,7 +79,7 @@ class Input(NamedTuple):
     """
 
     name: str
-    words: tuple[str, ...] = ()
+    words: str | tuple[str, ...] = ()
     files: Mapping[str, str | bytes] = {}
     prepare: Callable[[Path], Any] | None = None
     writes: tuple[str, ...] = ()
@@ -88,17 +89,18 @@ class Input(NamedTuple):
     shell: str = ""
     talk: Callable[[int], str] | None = None
 
+    @property
+    def line(self) -> tuple[str, ...]:
+        return tuple(shlex.split(self.words)) if isinstance(self.words, str) else self.words
+
 
 class Outcome(NamedTuple):
-    """What became of an input: one of `GOOD` or `BAD`, the exit code, and what was printed."""
-
     word: str
     code: int | None
     printed: str
 
 
 def outcome_of(tried: Input, folder: Path) -> Outcome:
-    """Play an input in an empty folder."""
     user = folder / "here"
     user.mkdir(parents=True)
     for name, content in tried.files.items():
@@ -107,7 +109,7 @@ def outcome_of(tried: Input, folder: Path) -> Outcome:
         path.write_bytes(content.encode() if isinstance(content, str) else content)
     meant = tried.prepare(user) if tried.prepare is not None else None
     if isinstance(meant, dict):
-        tried = tried._replace(words=tuple(meant.get(word, word) for word in tried.words))
+        tried = tried._replace(words=tuple(meant.get(word, word) for word in tried.line))
     before = kept(user, tried.writes)
     code, heard = ended(tried, user, folder)
     left = left_behind(user)
@@ -143,7 +145,6 @@ def word_of(
     stray: bool,
     left: bool,
 ) -> str:
-    """The outcome, the worst first."""
     both = stdout + stderr
     if code is None:
         return HANG
@@ -158,8 +159,7 @@ def word_of(
 
 
 def kept(user: Path, writes: tuple[str, ...]) -> dict[str, str]:
-    """What is in the user's folder, but for what may be written: path -> what shows whether it has
-    changed."""
+    """What is in the user's folder, but for what may be written: path -> its content's hash."""
     found = {}
     for path in sorted(user.rglob("*")):
         name = str(path.relative_to(user))
@@ -176,12 +176,8 @@ def kept(user: Path, writes: tuple[str, ...]) -> dict[str, str]:
 
 
 def ended(tried: Input, user: Path, folder: Path) -> tuple[int | None, str]:
-    """Play it; its exit code, None where it had to be killed, and what was heard of its server.
-
-    What is printed goes into files beside `user`.
-    """
     if tried.environment or tried.shell:
-        line = ["sh", "-c", tried.shell] if tried.shell else [CROSSCHECK, *tried.words]
+        line = ["sh", "-c", tried.shell] if tried.shell else [CROSSCHECK, *tried.line]
         env = os.environ | {"crosscheck": str(CROSSCHECK)} | WIDE | dict(tried.environment)
         with (folder / "stdout").open("wb") as stdout, (folder / "stderr").open("wb") as stderr:
             process = subprocess.Popen(
@@ -200,14 +196,13 @@ def ended(tried: Input, user: Path, folder: Path) -> tuple[int | None, str]:
                 process.wait()
                 return None, ""
     port = free_port() if tried.talk is not None else 0
-    words = tuple(word.replace("PORT", str(port)) for word in tried.words) if port else tried.words
+    words = tuple(word.replace("PORT", str(port)) if port else word for word in tried.line)
     forked = start(crosscheck_in, words, user, folder, WIDE)
     heard = "" if tried.talk is None else hear(tried.talk, forked, folder / "stdout")
     return code_of(forked), heard
 
 
 def code_of(process: BaseProcess) -> int | None:
-    """Wait for it; None where it had to be killed, with all that it had started."""
     process.join(SECONDS)
     if process.exitcode is None:
         assert process.pid is not None
@@ -218,7 +213,6 @@ def code_of(process: BaseProcess) -> int | None:
 
 
 def left_behind(user: Path) -> bool:
-    """Whether a process still works in the user's folder after `GRACE` s; it is killed."""
     end = time.monotonic() + GRACE
     while (found := working_in(user)) and time.monotonic() < end:
         time.sleep(0.05)
@@ -228,7 +222,6 @@ def left_behind(user: Path) -> bool:
 
 
 def working_in(user: Path) -> list[int]:
-    """The processes whose current folder is the user's, or in it."""
     found = []
     for entry in Path("/proc").iterdir():
         try:

@@ -14,14 +14,14 @@ from tests.hostile.small_run import TWO
 
 FILE = "two.toml"
 # A faulty scene is refused alike by whoever reads it: each input asks another command.
-COMMANDS: tuple[tuple[str, ...], ...] = (
-    ("truth", FILE),
-    ("run", FILE, "--out", "out"),
-    ("stability", FILE, "--vary", "speed", "--out", "out"),
-    ("play", FILE),
-    ("speed", FILE, "--out", "out"),
-    ("truth", FILE, "--json"),
-    ("run", "free_fall", FILE),
+COMMANDS = (
+    f"truth {FILE}",
+    f"run {FILE} --out out",
+    f"stability {FILE} --vary speed --out out",
+    f"play {FILE}",
+    f"speed {FILE} --out out",
+    f"truth {FILE} --json",
+    f"run free_fall {FILE}",
 )
 THRUST = "[[thrust]]\ndisk = 0\nstart = 0.0\nstop = 1.0\nforce = [{}, 0.0]\n"
 BOX = "[box]\nlow = [-3.0, -1.0]\nhigh = [3.0, 1.0]\n"
@@ -149,7 +149,6 @@ SHAPES: dict[str, tuple[str, str, str]] = {
 
 
 def turned(number: int, name: str, old: str, new: str, says: str) -> Input:
-    """A good scene in which one thing is another, put to the next command."""
     assert old in TWO, name
     return Input(
         name, COMMANDS[number % len(COMMANDS)], {FILE: TWO.replace(old, new, 1)}, says=says
@@ -189,43 +188,23 @@ AS_THEY_ARE = [
 
 
 def linked(to: str, here: Path) -> None:
-    """The scene file is a link."""
     (here / FILE).symlink_to(to)
 
 
-def device(path: str, here: Path) -> None:
-    """The scene file is a link to a device, which has no end."""
-    (here / FILE).symlink_to(path)
-
-
-def fifo(here: Path) -> None:
-    """Nobody ever writes into it."""
-    os.mkfifo(here / FILE)
-
-
-def folder(here: Path) -> None:
-    """With a scene's name."""
-    (here / FILE).mkdir()
-
-
-def nobody(_: Path) -> None:
-    """There is no file."""
-
-
 NO_FILES: dict[str, Callable[[Path], None]] = {
-    "no file": nobody,
-    "a folder as scene file": folder,
-    "a pipe as scene file": fifo,
+    "no file": lambda _: None,
+    "a folder as scene file": lambda here: (here / FILE).mkdir(),
+    "a pipe as scene file": lambda here: os.mkfifo(here / FILE),
     "a link to nothing": partial(linked, "nothing.toml"),
     "a link to itself": partial(linked, FILE),
     "a link to a folder": partial(linked, "."),
-    "a device without an end": partial(device, "/dev/zero"),
-    "a terminal that is none": partial(device, "/dev/tty"),
-    "a file of the kernel": partial(device, "/proc/self/mem"),
+    "a device without an end": partial(linked, "/dev/zero"),
+    "a terminal that is none": partial(linked, "/dev/tty"),
+    "a file of the kernel": partial(linked, "/proc/self/mem"),
 }
 READERS = cycle(COMMANDS[:4])
 NOT_FILES = [
-    Input(f"{name}, {words[0]}", words, prepare=prepare, says="two.toml: ")
+    Input(f"{name}, {words.split()[0]}", words, prepare=prepare, says="two.toml: ")
     for name, prepare in NO_FILES.items()
     for words in [next(READERS), next(READERS)]
 ]

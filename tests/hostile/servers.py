@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import json
 import socket
+from functools import partial
 from pathlib import Path
 
 from tests.hostile.played import Input
 from tests.hostile.small_run import TWO
 from tests.hostile.talks import Talk, asks, says, sends
 
-PLAY, LESSON = (
-    ("play", "--engine", "pymunk:shipped", "--port", "PORT"),
-    ("lesson", "--port", "PORT"),
-)
+PLAY, LESSON = "play --engine pymunk:shipped --port PORT", "lesson --port PORT"
 STOPPED = (143,)
 GET = b"GET %s HTTP/1.1\r\nHost: localhost:PORT\r\nConnection: close\r\n%s\r\n"
 UPGRADE = b"Connection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
@@ -21,7 +19,6 @@ FRAME = json.dumps({"do": "frames", "count": 1})
 
 
 def message(**fields: object) -> str:
-    """JSON."""
     return json.dumps(fields)
 
 
@@ -118,7 +115,6 @@ TABS: dict[str, tuple[Talk, str]] = {
 
 
 def busy(_: Path) -> dict[str, str]:
-    """A port that somebody has, for as long as this process lives."""
     TAKEN.append(one := socket.socket())
     one.bind(("127.0.0.1", 0))
     one.listen()
@@ -126,57 +122,53 @@ def busy(_: Path) -> dict[str, str]:
 
 
 TAKEN: list[socket.socket] = []
-PORTS: dict[str, tuple[str, ...]] = {
-    "port zero": ("play", "--port", "0"),
-    "a negative port": ("lesson", "--port", "-1"),
-    "a port that is too high": ("play", "--port", "65536"),
-    "a port in text": ("lesson", "--port", "http"),
-    "half a port": ("play", "--port", "8000.5"),
+PORTS: dict[str, str | tuple[str, ...]] = {
+    "port zero": "play --port 0",
+    "a negative port": "lesson --port -1",
+    "a port that is too high": "play --port 65536",
+    "a port in text": "lesson --port http",
+    "half a port": "play --port 8000.5",
     "an empty port": ("lesson", "order", "--port", ""),
 }
+served = partial(Input, codes=STOPPED)
 SERVERS = (
     *(
-        Input(f"{words[0]}: {what}", words, codes=STOPPED, says=heard, talk=talk)
+        served(f"{words.split()[0]}: {what}", words, says=heard, talk=talk)
         for number, (what, (talk, heard)) in enumerate(REQUESTS.items())
         for words in [(PLAY, LESSON)[number % 2]]
     ),
     *(
-        Input(
-            f"a tab that sends {what}", PLAY, codes=STOPPED, says='"kind":"fault"', talk=says(text)
-        )
+        served(f"a tab that sends {what}", PLAY, says='"kind":"fault"', talk=says(text))
         for what, text in FAULTY.items()
     ),
     *(
-        Input(f"a tab that sends {what}", PLAY, codes=STOPPED, says=heard, talk=talk)
+        served(f"a tab that sends {what}", PLAY, says=heard, talk=talk)
         for what, (talk, heard) in TABS.items()
     ),
     *(Input(name, words, says="--port") for name, words in PORTS.items()),
-    Input(
+    served(
         "a port that is taken",
-        ("play", "--engine", "pymunk:shipped", "--port", "BUSY"),
+        "play --engine pymunk:shipped --port BUSY",
         prepare=busy,
-        codes=STOPPED,
         says="is taken: this is on",
         talk=asks("GET", "/"),
     ),
-    Input(
+    served(
         "a flight of a scene in markup",
-        ("play", "two.toml", "--engine", "pymunk:shipped", "--port", "PORT"),
+        "play two.toml --engine pymunk:shipped --port PORT",
         {"two.toml": TWO.replace("Does a", "</script><script>alert(1)</script> [/nope] Does a")},
-        codes=STOPPED,
         says="200 ",
         talk=asks("GET", "/"),
     ),
     Input(
         "a solver that hangs, in flight",
-        ("play", "--engine", "mine.py"),
+        "play --engine mine.py",
         {"mine.py": "while True: pass\n"},
         says="does not come back",
     ),
-    Input(
+    served(
         "a browser that is not there",
-        ("lesson", "--port", "PORT", "--open"),
-        codes=STOPPED,
+        "lesson --port PORT --open",
         talk=asks("GET", "/"),
         says="200 ",
     ),

@@ -9,15 +9,13 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 
 from tests.hostile.played import CROSSCHECK
 
 TWO = (Path(__file__).parents[1] / "data" / "scenes" / "two.toml").read_text()
 MADE = "CROSSCHECK_HOSTILE_RUN"  # variable that says to the processes of the pool where it is
-RUN = ("run", "two.toml", "--engine", "pymunk", "--dt", "0.02", "--workers", "1")
-Prepare = Callable[[Path], dict[str, str]]
+RUN = "run two.toml --engine pymunk --dt 0.02 --workers 1"
 
 
 def finished_run() -> Path:
@@ -28,7 +26,7 @@ def finished_run() -> Path:
         atexit.register(shutil.rmtree, place, ignore_errors=True)
         (place / "two.toml").write_text(TWO)
         subprocess.run(
-            [CROSSCHECK, *RUN, "--out", "out"],
+            [CROSSCHECK, *RUN.split(), "--out", "out"],
             cwd=place,
             check=True,
             capture_output=True,
@@ -38,23 +36,14 @@ def finished_run() -> Path:
     return Path(os.environ[MADE])
 
 
-def copy(here: Path, *names: str) -> dict[str, str]:
-    """Set copies of the run into a folder, as if it had been made there, with its scene file."""
-    for name in names:
-        shutil.copytree(finished_run(), here / name)
-    (here / "two.toml").write_text(TWO)
-    return {}
+def copied(then: Callable[[Path], object] | None = None) -> Callable[[Path], None]:
+    """Sets a copy of the run into a folder, as if it had been made there, with its scene file;
+    then something more."""
 
+    def copy(here: Path) -> None:
+        shutil.copytree(finished_run(), here / "out")
+        (here / "two.toml").write_text(TWO)
+        if then is not None:
+            then(here)
 
-def copied(*names: str, then: Callable[[Path], object] | None = None) -> Prepare:
-    """What `copy` does, and then something more with the folder in which the copies are."""
-    return partial(_copied, names, then)
-
-
-def _copied(
-    names: tuple[str, ...], then: Callable[[Path], object] | None, here: Path
-) -> dict[str, str]:
-    words = copy(here, *names)
-    if then is not None:
-        then(here)
-    return words
+    return copy

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from tests.hostile.played import Input
@@ -13,19 +14,7 @@ from tests.hostile.small_run import TWO as WALLED
 CORRECT = Path(__file__).parent.parent / "solvers" / "correct"
 PY, JS = (CORRECT / "plain.py").read_text(), (CORRECT / "plain.js").read_text()
 TWO = WALLED[: WALLED.index("[[wall]]")]  # the exercise's functions know no walls
-PLAYED = (
-    "run",
-    "two.toml",
-    "--dt",
-    "0.02",
-    "--workers",
-    "1",
-    "--timeout",
-    "5",
-    "--out",
-    "out",
-    "--engine",
-)
+PLAYED = "run two.toml --dt 0.02 --workers 1 --timeout 5 --out out --engine"
 STEP, COLLISION = (
     "def integrate(sphere, dt):\n",
     "def sphereSphereCollisionHandling(sphereA, sphereB):\n",
@@ -186,6 +175,8 @@ CALLED: dict[str, tuple[str, str, str]] = {
     ),
 }
 WRITES = ("check.html", "out", "out.part")
+right = partial(Input, codes=(0,), writes=WRITES)
+either = partial(Input, codes=(0, 1))
 CHECKED = tuple(
     Input(
         f"check: {what}",
@@ -233,7 +224,7 @@ ENGINES = (
     *(
         Input(
             f"run: {what}",
-            (*PLAYED, name),
+            f"{PLAYED} {name}",
             {"two.toml": TWO, name: f"{text}\n{PY}" if what in LOADING else text},
             writes=WRITES,
             codes=(0, 1) if what.endswith("printed") else (1,),
@@ -243,7 +234,7 @@ ENGINES = (
     ),
     Input(
         "run: no function at all",
-        (*PLAYED, "mine.py"),
+        f"{PLAYED} mine.py",
         {"two.toml": TWO, "mine.py": LOADING["no function at all"][1]},
         says="has neither the functions of the exercise",
     ),
@@ -254,39 +245,31 @@ ENGINES = (
 DELETES = within("import os", "if os.path.exists(__file__): os.remove(__file__)")
 WRITING = f"open('made_by_me.txt', 'w').write('x')\n{PY}"
 OWN_DOING = (
-    Input(
-        "check: deletes itself",
-        ("check", "mine.py"),
-        {"mine.py": DELETES},
-        codes=(0, 1),
-        writes=(*WRITES, "mine.py"),
+    either(
+        "check: deletes itself", "check mine.py", {"mine.py": DELETES}, writes=(*WRITES, "mine.py")
     ),
-    Input(
+    either(
         "run: deletes itself",
-        (*PLAYED, "mine.py"),
+        f"{PLAYED} mine.py",
         {"two.toml": TWO, "mine.py": DELETES},
-        codes=(0, 1),
         writes=(*WRITES, "mine.py"),
     ),
-    Input(
+    either(
         "check: writes into where one is",
-        ("check", "mine.py"),
+        "check mine.py",
         {"mine.py": WRITING},
-        codes=(0, 1),
         writes=(*WRITES, "made_by_me.txt"),
     ),
-    Input(
+    either(
         "run: writes over itself",
-        (*PLAYED, "mine.py"),
+        f"{PLAYED} mine.py",
         {"two.toml": TWO, "mine.py": within("open(__file__, 'w').write('nonsense(')")},
-        codes=(0, 1),
         writes=(*WRITES, "mine.py"),
     ),
-    Input(
+    either(
         "run: leaves where one is",
-        (*PLAYED, "mine.py"),
+        f"{PLAYED} mine.py",
         {"two.toml": TWO, "mine.py": within("import os; os.chdir('/')")},
-        codes=(0, 1),
         writes=WRITES,
     ),
 )
@@ -307,15 +290,15 @@ NO_TEXT: dict[str, tuple[str, str | bytes | Callable[[Path], object] | None]] = 
 }
 REFUSED = tuple(
     Input(
-        f"{words[0]}: {what}",
-        (*words, name),
+        f"{words.split()[0]}: {what}",
+        f"{words} {name}",
         {} if content is None or callable(content) else {name: content},
         prepare=content if callable(content) else None,
         says=name,
     )
     for number, (what, (name, content)) in enumerate(NO_TEXT.items())
-    for words in (("check",), (("run", "free_fall", "--engine"), ("play", "--engine"))[number % 2])
-    if not (words == ("check",) and "folder" in what)
+    for words in ("check", ("run free_fall --engine", "play --engine")[number % 2])
+    if not (words == "check" and "folder" in what)
 )
 
 # Files with the names of Python's own modules, and of ours: nothing imports them.
@@ -333,37 +316,27 @@ MODULES = (
 )
 TRAPS = dict.fromkeys(MODULES, TRAP)
 BESIDE = (
-    Input(
-        "check: beside modules of Python's names",
-        ("check", "mine.py"),
-        TRAPS | {"mine.py": PY},
-        codes=(0,),
-        writes=WRITES,
-    ),
-    Input(
+    right("check: beside modules of Python's names", "check mine.py", TRAPS | {"mine.py": PY}),
+    right(
         "run: beside modules of Python's names",
-        (*PLAYED, "pymunk:shipped"),
+        f"{PLAYED} pymunk:shipped",
         TRAPS | {"two.toml": TWO},
-        codes=(0,),
-        writes=WRITES,
         says="1 cell ended: 1 ok",
     ),
     Input(
         "truth: beside modules of Python's names",
-        ("truth", "two.toml"),
+        "truth two.toml",
         TRAPS | {"two.toml": TWO},
         codes=(0,),
     ),
-    Input(
+    right(
         "run with a shell: beside modules of Python's names",
         files=TRAPS | {"two.toml": TWO},
-        codes=(0,),
-        writes=WRITES,
-        shell=f"$crosscheck {' '.join(PLAYED)} pymunk:shipped",
+        shell=f"$crosscheck {PLAYED} pymunk:shipped",
     ),
     Input(
         "check: a folder of such modules",
-        ("check", "."),
+        "check .",
         {"random.py": TRAP, "mine.py": PY},
         codes=(1,),
         writes=(*WRITES, "trapped.txt"),
@@ -371,72 +344,31 @@ BESIDE = (
     ),
 )
 NAMES = (
-    Input(
-        "check: a name in capitals",
-        ("check", "UPPER.PY"),
-        {"UPPER.PY": PY},
-        codes=(0,),
-        writes=WRITES,
-    ),
-    Input(
+    right("check: a name in capitals", "check UPPER.PY", {"UPPER.PY": PY}),
+    right(
         "run: a name in capitals",
-        (*PLAYED, "UPPER.PY"),
+        f"{PLAYED} UPPER.PY",
         {"two.toml": TWO, "UPPER.PY": PY},
-        codes=(0,),
-        writes=WRITES,
         says="1 cell ended: 1 ok",
     ),
     Input(
-        "run: a name with a colon",
-        ("run", "free_fall", "--engine", "a:b.py"),
-        {"a:b.py": PY},
-        says="colon",
+        "run: a name with a colon", "run free_fall --engine a:b.py", {"a:b.py": PY}, says="colon"
     ),
-    Input(
-        "check: a name in markup",
-        ("check", "[/nope].py"),
-        {"[/nope].py": PY},
-        codes=(0,),
-        writes=WRITES,
-    ),
-    Input(
-        "check: a name with escape codes",
-        ("check", "a\x1b[31m.py"),
-        {"a\x1b[31m.py": PY},
-        codes=(0,),
-        writes=WRITES,
-    ),
-    Input(
-        "check: a name with a line end",
-        ("check", "a\nb.py"),
-        {"a\nb.py": PY},
-        codes=(0,),
-        writes=WRITES,
-    ),
-    Input(
-        "check: a name like an option",
-        ("check", "--", "--json.py"),
-        {"--json.py": PY},
-        codes=(0,),
-        writes=WRITES,
-    ),
-    Input(
+    right("check: a name in markup", ("check", "[/nope].py"), {"[/nope].py": PY}),
+    right("check: a name with escape codes", ("check", "a\x1b[31m.py"), {"a\x1b[31m.py": PY}),
+    right("check: a name with a line end", ("check", "a\nb.py"), {"a\nb.py": PY}),
+    right("check: a name like an option", "check -- --json.py", {"--json.py": PY}),
+    right(
         "check: letters of another encoding",
-        ("check", "mine.py"),
+        "check mine.py",
         {"mine.py": f"# {'ü' * 20}\n{PY}".encode("latin-1")},
-        codes=(0,),
-        writes=WRITES,
     ),
-    Input(
-        "check: UTF-16 from an editor of Windows",
-        ("check", "mine.py"),
-        {"mine.py": PY.encode("utf-16")},
-        codes=(0,),
-        writes=WRITES,
+    right(
+        "check: UTF-16 from an editor of Windows", "check mine.py", {"mine.py": PY.encode("utf-16")}
     ),
     Input(
         "check: a class of which nobody has a solver",
-        ("check", "."),
+        "check .",
         {"a/mine.py": "x = (\n", "b/mine.js": "x = ;\n", "c/read.me": "later", "d/mine.py": ""},
         codes=(1, 2),
         writes=WRITES,

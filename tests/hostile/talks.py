@@ -9,7 +9,6 @@ import signal
 import socket
 import time
 from collections.abc import Callable
-from functools import partial
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 
@@ -22,7 +21,6 @@ NOT_ANY_MORE = "it does not serve any more"
 
 
 def free_port() -> int:
-    """One that nobody has."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         return int(free.getsockname()[1])
@@ -51,7 +49,7 @@ def hear(talk: Talk, server: BaseProcess, stdout: Path) -> str:
 
 
 def asked(port: int, method: str, path: str, body: bytes = b"", **headers: str) -> str:
-    """Status and text of the answer to a request; in the names of headers a `_` stands for `-`."""
+    """Status and text; in the names of headers a `_` stands for `-`."""
     connection = http.client.HTTPConnection("127.0.0.1", port, timeout=ANSWERS)
     try:
         connection.request(
@@ -67,33 +65,27 @@ def asked(port: int, method: str, path: str, body: bytes = b"", **headers: str) 
 
 
 def asks(method: str, path: str, body: bytes = b"", **headers: str) -> Talk:
-    """One request."""
-    return partial(_asks, method, path, body, headers)
-
-
-def _asks(method: str, path: str, body: bytes, headers: dict[str, str], port: int) -> str:
-    return asked(port, method, path, body, **headers)
+    return lambda port: asked(port, method, path, body, **headers)
 
 
 def sends(*what: bytes, times: int = 1) -> Talk:
     """Bytes as they are, `times` times; what comes back until the other end closes, or says nothing
     for a second."""
-    return partial(_sends, what, times)
 
+    def talk(port: int) -> str:
+        heard = b""
+        with socket.create_connection(("127.0.0.1", port), ANSWERS) as connection:
+            for piece in what * times:
+                connection.sendall(piece.replace(b"PORT", str(port).encode()))
+            connection.settimeout(1.0)
+            try:
+                while more := connection.recv(65536):
+                    heard += more
+            except TimeoutError:
+                heard += b" (silence)"
+        return heard.decode("utf-8", "backslashreplace")
 
-def _sends(what: tuple[bytes, ...], times: int, port: int) -> str:
-    heard = b""
-    with socket.create_connection(("127.0.0.1", port), ANSWERS) as connection:
-        for _ in range(times):
-            for each in what:
-                connection.sendall(each.replace(b"PORT", str(port).encode()))
-        connection.settimeout(1.0)
-        try:
-            while more := connection.recv(65536):
-                heard += more
-        except TimeoutError:
-            heard += b" (silence)"
-    return heard.decode("utf-8", "backslashreplace")
+    return talk
 
 
 def says(
@@ -102,26 +94,24 @@ def says(
     origin: str = "http://localhost:PORT",
     wait: bool = True,
 ) -> Talk:
-    """A tab of the game that sends these after its first answer; what it hears, and how it is
-    closed."""
-    return partial(_says, messages, path, origin, wait)
 
+    def talk(port: int) -> str:
+        heard = []
+        try:
+            with connect(
+                f"ws://localhost:{port}{path}",
+                origin=origin.replace("PORT", str(port)) or None,  # type: ignore[arg-type]
+                open_timeout=ANSWERS,
+                max_size=None,
+            ) as tab:
+                heard.append(str(tab.recv(timeout=STARTS)))
+                for message in messages:
+                    tab.send(message)
+                    if wait:
+                        heard.append(str(tab.recv(timeout=ANSWERS)))
+                tab.close()
+        except (ConnectionClosed, InvalidHandshake) as closed:
+            heard.append(str(closed))
+        return "\n".join(heard)
 
-def _says(messages: tuple[str | bytes, ...], path: str, origin: str, wait: bool, port: int) -> str:
-    heard = []
-    try:
-        with connect(
-            f"ws://localhost:{port}{path}",
-            origin=origin.replace("PORT", str(port)) or None,  # type: ignore[arg-type]
-            open_timeout=ANSWERS,
-            max_size=None,
-        ) as tab:
-            heard.append(str(tab.recv(timeout=STARTS)))
-            for message in messages:
-                tab.send(message)
-                if wait:
-                    heard.append(str(tab.recv(timeout=ANSWERS)))
-            tab.close()
-    except (ConnectionClosed, InvalidHandshake) as closed:
-        heard.append(str(closed))
-    return "\n".join(heard)
+    return talk

@@ -57,15 +57,12 @@ Key = tuple[str, str]  # family and name of an input
 
 
 def play(key: Key) -> tuple[Key, Outcome, float]:
-    """In a process of the pool: play an input; its outcome, and how long it took (s)."""
     began = perf_counter()
     with TemporaryDirectory() as folder:
         return key, outcome_of(ALL[key], Path(folder) / "input"), perf_counter() - began
 
 
 def play_all(keys: Iterable[Key]) -> Iterator[tuple[Key, Outcome, float]]:
-    """Play these inputs, as many at once as there are cores; the slow ones, which start engines,
-    are spread."""
     finished_run()  # once, before the processes of the pool look for it
     with ProcessPoolExecutor(os.cpu_count(), multiprocessing.get_context("spawn")) as pool:
         yield from pool.map(play, keys)
@@ -73,7 +70,6 @@ def play_all(keys: Iterable[Key]) -> Iterator[tuple[Key, Outcome, float]]:
 
 @pytest.fixture(scope="module")
 def found(request: pytest.FixtureRequest) -> dict[Key, Outcome]:
-    """The outcomes of the inputs that are selected, played two or more at once."""
     calls = [getattr(item, "callspec", None) for item in request.session.items]
     keys = [call.params["key"] for call in calls if call is not None and "key" in call.params]
     return {key: outcome for key, outcome, _ in play_all(keys)}
@@ -89,7 +85,6 @@ def found(request: pytest.FixtureRequest) -> dict[Key, Outcome]:
     ],
 )
 def test_an_input_ends_as_it_should(found: dict[Key, Outcome], key: Key):
-    """With the outcome that is kept, which is none of the bad ones."""
     word, code, printed = found[key]
 
     assert word not in BAD, f"{word}, exit {code}:\n{printed}"
@@ -97,7 +92,6 @@ def test_an_input_ends_as_it_should(found: dict[Key, Outcome], key: Key):
 
 
 def test_every_input_has_its_outcome_kept_and_none_of_them_is_bad():
-    """At least 300, each once."""
     assert list(outcomes()) == list(ALL)
     assert len(ALL) == sum(map(len, FAMILIES.values())) >= 300
     assert not any(word in BAD for word, _ in outcomes().values())
@@ -129,7 +123,6 @@ def test_every_input_has_its_outcome_kept_and_none_of_them_is_bad():
 def test_a_program_that_ends_otherwise_is_noticed(
     shell: str, word: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    """The negative controls, of every bad outcome; and two good ones."""
     monkeypatch.setattr(played, "SECONDS", 1.0)
     monkeypatch.setattr(played, "GRACE", 0.3)
     tried = Input(
@@ -157,8 +150,6 @@ def outcomes() -> dict[Key, tuple[str, int | None]]:
 
 
 def main(named: list[str]) -> None:
-    """Play these families and inputs, all if none is named; print the bad ones, and write their
-    rows anew."""
     rows, began, seconds_of = {}, perf_counter(), {}
     for key, outcome, seconds in play_all(key for key in ALL if not named or {*key} & {*named}):
         rows[key], seconds_of[key] = (outcome.word, outcome.code), seconds

@@ -49,8 +49,6 @@ for x, walls, e, friction in LASTING:
 
 @pytest.mark.slow
 def test_plain_python_gives_the_same_bits_as_the_compiled_solver():
-    """A crowd with collisions, two walls, gravity, wrap, spin, forces and a static disk, through
-    every variant."""
     outputs = [
         subprocess.run(
             [sys.executable, "-c", SCENE],

@@ -24,7 +24,6 @@ FLOOR = [[[-8.0, 0.0], [8.0, 0.0]]]
 
 
 def after(scene, t, dt, variant):
-    """The state after t s."""
     engine = Reference(variant)
     engine.load(scene, dt)
     engine.step(round(t / dt))
@@ -33,7 +32,6 @@ def after(scene, t, dt, variant):
 
 @pytest.mark.parametrize("name", ["gas_of_100", "box_billiard", "disk_between_static_disks"])
 def test_with_friction_0_it_is_the_exercise_to_the_bit(name):
-    """Pairs, walls, static disks, forces; not on a torus, where the exercise cuts off a flight."""
     scene = scenario(name)
     one, other = (
         play(Reference(variant), "one:run", scene, scene.dt(2)).trajectory
@@ -46,13 +44,11 @@ def test_with_friction_0_it_is_the_exercise_to_the_bit(name):
 
 @pytest.mark.parametrize("variant", [exercise, neighbours, lesson])
 def test_what_the_exercise_and_the_lesson_ask_for_has_no_friction(variant):
-    """They say so, and play nothing."""
     with pytest.raises(Unsupported, match=r"does not model friction, the scene has 0\.3"):
         Reference(variant).load(thrown(0.5, 0.3), 0.01)
 
 
 def thrown(e, mu):
-    """A solid disk of 1 kg and 0.25 m that meets a floor at (5, -5) m/s."""
     return Scene(
         position=[[-4.0, 1.0]],
         velocity=[[5.0, -5.0]],
@@ -68,8 +64,8 @@ def thrown(e, mu):
 @pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
 @pytest.mark.parametrize("mu", [0.0, 0.1, 0.3, 0.5, 2.0])
 def test_a_bounce_takes_up_coulombs_impulse(variant, e, mu):
-    """mu (1 + e) m v_n while it slides, v_t / (1/m + r2/I) = v_t / 3 if it ends rolling; turning
-    clockwise."""
+    # mu (1 + e) m v_n while it slides, v_t / (1/m + r2/I) = v_t / 3 if it ends rolling; turning
+    # clockwise.
     end = after(thrown(e, mu), 0.5, 1 / 60, variant)
     J = min(mu * (1 + e) * 5.0, 5.0 / 3)
     # The normal of a floor of 16 m is known to some roundings of 16 m over a radius, and turns
@@ -89,7 +85,6 @@ def test_a_bounce_takes_up_coulombs_impulse(variant, e, mu):
 def test_two_disks_that_rub_keep_momentum_and_angular_momentum_and_make_no_energy(
     e, mu, spins, offset, masses
 ):
-    """And the impulse along the surfaces is at most mu times that along the normal."""
     scene = Scene(
         position=[[-0.65, offset / 2], [0.65, -offset / 2]],
         velocity=[[3.0, 0.0], [-2.0, 0.5]],
@@ -116,20 +111,17 @@ def test_two_disks_that_rub_keep_momentum_and_angular_momentum_and_make_no_energ
 
 
 def quantities(scene, state):
-    """Momentum and angular momentum about the origin."""
     x, v, m = state.position, state.velocity, scene.mass
     turning = m * (x[:, 0] * v[:, 1] - x[:, 1] * v[:, 0]) + scene.inertia * state.angular_velocity
     return [*(m @ v), turning.sum()]
 
 
 def energy(scene, state):
-    """J, of motion."""
     speed2 = (state.velocity**2).sum(axis=1)
     return float((scene.mass @ speed2 + scene.inertia @ state.angular_velocity**2) / 2)
 
 
 def placed(mu, slope=0.0, speed=0.0, spin=0.0, e=0.0):
-    """A disk of 0.25 m on a floor, or on a slope that falls to the right by that angle."""
     return Scene(
         position=[[0.0, 0.25]],
         velocity=[[speed, 0.0]],
@@ -146,8 +138,7 @@ def placed(mu, slope=0.0, speed=0.0, spin=0.0, e=0.0):
 @pytest.mark.parametrize("e", [0.0, 0.5])
 @pytest.mark.parametrize("rate", [16, 60, 960])
 def test_ordered_slides_and_then_rolls_as_the_closed_form(e, rate):
-    """-mu g for v0 / (3 mu g) = 1/2 s, then 2/3 v0, whether that is a whole number of steps or
-    not."""
+    # -mu g for v0 / (3 mu g) = 1/2 s, then 2/3 v0, whether that is a whole number of steps or not.
     scene = placed(0.2, speed=3.0, e=e)
     for t in (0.25, 1.0):
         end, slid = after(scene, t, 1 / rate, ordered), min(t, 0.5)
@@ -160,7 +151,6 @@ def test_ordered_slides_and_then_rolls_as_the_closed_form(e, rate):
 
 
 def test_ordered_changes_from_sliding_to_rolling_within_a_step():
-    """At 0.5 s, in the middle of a step of 1/15 s: position and angle as if there were no steps."""
     end = after(placed(0.2, speed=3.0), 1.0, 1 / 15, ordered)
     assert end.position[0, 0] == pytest.approx(2.25, abs=100 * ROUNDING)
     assert end.angle[0] == pytest.approx(-(8 * 0.25 + 8 * 0.5), abs=800 * ROUNDING)
@@ -168,7 +158,7 @@ def test_ordered_changes_from_sliding_to_rolling_within_a_step():
 
 @pytest.mark.parametrize("variant", [coulomb, ordered])
 def test_backspin_brings_a_disk_back(variant):
-    """At 1 m/s with 20 rad/s of backspin it ends rolling at (2 v0 - r w) / 3 = -1 m/s."""
+    # At 1 m/s with 20 rad/s of backspin it ends rolling at (2 v0 - r w) / 3 = -1 m/s.
     end = after(placed(0.2, speed=1.0, spin=20.0), 2.0, 1 / 60, variant)
     assert end.velocity[0, 0] == pytest.approx(-1.0, abs=1e-10)
     assert end.angular_velocity[0] == pytest.approx(4.0, abs=1e-9)
@@ -177,7 +167,7 @@ def test_backspin_brings_a_disk_back(variant):
 @pytest.mark.parametrize("variant", [coulomb, ordered])
 @pytest.mark.parametrize("share", [0.9, 1.1])
 def test_on_a_slope_a_disk_rolls_up_to_three_times_the_friction(variant, share):
-    """tan(angle) <= mu (1 + m r2/I): g sin / (1 + 1/2) down to there, g (sin - mu cos) beyond."""
+    # tan(angle) <= mu (1 + m r2/I): g sin / (1 + 1/2) down to there, g (sin - mu cos) beyond.
     mu = 0.2
     slope = atan(share * 3 * mu)
     end = after(placed(mu, slope), 0.5, 1 / 60, variant)
@@ -189,7 +179,6 @@ def test_on_a_slope_a_disk_rolls_up_to_three_times_the_friction(variant, share):
 
 
 def test_a_static_disk_is_rubbed_but_does_not_turn():
-    """Mass and inertia without end."""
     scene = Scene(
         position=[[0.0, 0.0], [1.2, 0.1]],
         velocity=[[0.0, 0.0], [-2.0, 1.0]],
@@ -206,7 +195,7 @@ def test_a_static_disk_is_rubbed_but_does_not_turn():
 
 
 def test_a_torque_turns_a_disk_on_a_floor_into_motion():
-    """What rolls under a torque M moves at a = M r / (I + m r2)."""
+    # What rolls under a torque M moves at a = M r / (I + m r2).
     engine = ENGINES["reference:ordered"].make()
     engine.load(placed(0.5), 1 / 64)
     for _ in range(64):
@@ -221,7 +210,6 @@ def test_a_torque_turns_a_disk_on_a_floor_into_motion():
 
 @pytest.mark.parametrize("variant", [coulomb, ordered])
 def test_friction_does_not_turn_a_static_disk_whose_inertia_is_finite(variant):
-    """Its inertia may stand in a scene file; the disk that meets it is turned."""
     scene = Scene(
         position=[[0.0, 0.0], [1.0, 0.1]],
         velocity=[[0.0, 0.0], [-1.0, 0.0]],
@@ -254,9 +242,9 @@ def sunk_by(scene, disks, steps=90, dt=1 / 120):
 
 
 def test_disks_at_rest_take_no_collisions_of_a_step_from_each_other():
-    """Each meets its incline again and again at the same instant, by the rounding of the force that
-    holds it: after `MOST` times that is no collision. Else one would fall freely for a step, by g
-    cos(angle) dt2 / 2 or more."""
+    # Each meets its incline again and again at the same instant, by the rounding of the force that
+    # holds it: after `MOST` times that is no collision. Else one would fall freely for a step, by g
+    # cos(angle) dt2 / 2 or more.
     scene = scenario("roll_or_slide").scene
     together = sunk_by(scene, np.arange(scene.n))
     # some hundred steps round a height of up to 4 m, and `EXACT` of a radius may be left

@@ -64,7 +64,6 @@ def tolerance(disks, velocity):
     ],
 )
 def test_head_on_collisions_of_the_textbook(solver, mass, e, before, after):
-    """All numbers are short in binary, so the answers are exact."""
     disks = make_disks([[-0.5, 0], [0.4, 0]], [[before[0], 0], [before[1], 0]], [0.5, 0.5], mass)
     solver.collide(disks, 0, 1, World(restitution=e))
     # 1/3 is not short: a few roundings remain where the masses are 1 and 3.
@@ -76,8 +75,8 @@ def test_head_on_collisions_of_the_textbook(solver, mass, e, before, after):
     ("solver", "way"), [(exercise, 1.0), (lesson, 0.0)], ids=["exercise", "lesson"]
 )
 def test_one_step_from_rest_tells_the_order_of_the_updates(solver, way):
-    """Symplectic Euler moves by a dt2 in its first step, explicit Euler not at all; gravity, force
-    and torque alike."""
+    # Symplectic Euler moves by a dt2 in its first step, explicit Euler not at all; gravity, force
+    # and torque alike.
     disks = make_disks([[0, 0], [9, 9]], np.zeros((2, 2)), [1, 1], [2, 2], inertia=[4, 4])
     disks.force[0], disks.torque[0] = [4.0, 8.0], 2.0
     solver.advance(disks, World(gravity=np.array([0.0, -1.0])), 0.5, 1)
@@ -91,7 +90,6 @@ def test_one_step_from_rest_tells_the_order_of_the_updates(solver, way):
 @steady
 @given(pair=overlapping_pairs())
 def test_a_collision_keeps_the_momentum(solver, pair):
-    """m1 dv1 = -m2 dv2, to rounding of the velocities."""
     disks, world = pair
     before, after, _, _ = before_and_after(solver, disks, world)
     change = disks.mass @ (after - before)
@@ -102,7 +100,6 @@ def test_a_collision_keeps_the_momentum(solver, pair):
 @steady
 @given(pair=overlapping_pairs())
 def test_a_collision_reverses_the_normal_speed_by_e_and_leaves_the_tangential(solver, pair):
-    """A pair that parts already is left alone."""
     disks, world = pair
     before, after, n, impulse = before_and_after(solver, disks, world)
     closing, separating = ((v[0] - v[1]) @ n for v in (before, after))
@@ -121,8 +118,6 @@ def test_a_collision_reverses_the_normal_speed_by_e_and_leaves_the_tangential(so
 @steady
 @given(pair=overlapping_pairs())
 def test_the_order_of_the_two_disks_does_not_matter(solver, pair):
-    """Numbered the other way round, the same disks end up in the same places at the same
-    velocities."""
     disks, world = pair
     swapped = make_disks(
         disks.position[::-1], disks.velocity[::-1], disks.radius[::-1], disks.mass[::-1]
@@ -139,7 +134,6 @@ def test_the_order_of_the_two_disks_does_not_matter(solver, pair):
 @steady
 @given(pair=overlapping_pairs())
 def test_projection_leaves_the_pair_touching_and_the_centre_of_mass_in_place(solver, pair):
-    """By inverse mass: the heavier, the less it gives way."""
     disks, world = pair
     centre = disks.mass @ disks.position / disks.mass.sum()
     solver.collide(disks, 0, 1, world)
@@ -158,14 +152,12 @@ def test_projection_leaves_the_pair_touching_and_the_centre_of_mass_in_place(sol
     ],
 )
 def test_the_split_of_the_overlap_is_free_but_for_static_disks(split, mass, moved):
-    """An overlap of 0.5 between disks of 1 and 3 kg; whatever the split, they touch afterwards."""
     disks = make_disks([[0, 0], [1.5, 0]], np.zeros((2, 2)), [1, 1], mass)
     exercise.collide(disks, 0, 1, World(split=split))
     assert (disks.position[:, 0] - [0, 1.5]).tolist() == list(moved)
 
 
 def test_the_formula_as_printed_draws_a_separating_pair_together():
-    """It has no condition on the sign of the speed; ours acts on approaching pairs only."""
     for approaching_only, after in ((True, [-1.0, 1.0]), (False, [0.9, -0.9])):
         disks = make_disks([[0, 0], [0.9, 0]], [[-1, 0], [1, 0]], [0.5, 0.5], [1, 1])
         impulse = exercise.collide(
@@ -180,8 +172,8 @@ def test_the_formula_as_printed_draws_a_separating_pair_together():
 @steady
 @given(pair=overlapping_pairs())
 def test_the_equations_of_the_lesson_equal_the_impulse_of_the_exercise(pair):
-    """V1 = (m1 v1 + m2 v2 - m2 (v1 - v2) e)/(m1 + m2) as printed, ours divided by m1 m2, and J/m:
-    one law."""
+    # V1 = (m1 v1 + m2 v2 - m2 (v1 - v2) e)/(m1 + m2) as printed, ours divided by m1 m2, and J/m:
+    # one law.
     disks, world = pair
     m1, m2 = disks.mass
     bound = tolerance(disks, disks.velocity)
@@ -201,7 +193,6 @@ def test_the_equations_of_the_lesson_equal_the_impulse_of_the_exercise(pair):
 @steady
 @given(pair=overlapping_pairs(), static=st.integers(0, 1))
 def test_a_static_disk_never_moves(solver, pair, static):
-    """Struck, under a force, under gravity, or overlapped by another static disk: to the bit."""
     disks, world = pair
     disks.mass[static], disks.velocity[static] = np.inf, 0.0
     disks.force[...], disks.torque[...] = 3.0, 2.0
@@ -220,7 +211,6 @@ def test_a_static_disk_never_moves(solver, pair, static):
 @steady
 @given(e=st.floats(0, 1), vx=speeds, vy=st.floats(0.01, 10))
 def test_a_wall_reflects_as_a_static_disk_does(solver, e, vx, vy):
-    """The same change of velocity from a floor below as from a static disk right below."""
     wall = World(restitution=e, walls=np.array([[[-1.0, 0.0], [1.0, 0.0]]]))
     by_wall = make_disks([[0, 0.9]], [[vx, -vy]], [1], [2])
     log = solver.advance(by_wall, wall, 0.0, 1)
@@ -233,7 +223,6 @@ def test_a_wall_reflects_as_a_static_disk_does(solver, e, vx, vy):
 
 
 def test_only_the_exercise_sets_a_disk_back_onto_the_wall():
-    """The lesson flips the velocity and leaves the position as it is."""
     world = World(walls=np.array([[[-1.0, 0.0], [1.0, 0.0]]]))
     for solver, height in ((exercise, 1.0), (lesson, 0.875)):
         disks = make_disks([[0, 1]], [[0, -0.125]], [1], [1])
@@ -243,8 +232,6 @@ def test_only_the_exercise_sets_a_disk_back_onto_the_wall():
 
 @both
 def test_a_wall_ends_where_it_ends(solver):
-    """Beside its end nothing is struck; over its end the normal points from the end to the
-    centre."""
     world = World(restitution=1.0, walls=np.array([[[0.0, 0.0], [-1.0, 0.0]]]))
     past = make_disks([[1.5, 0.5]], [[0, -1]], [1], [1])
     assert solver.advance(past, world, 0.25, 4) == []
@@ -255,8 +242,8 @@ def test_a_wall_ends_where_it_ends(solver):
 
 @both
 def test_a_centre_beyond_an_edge_comes_in_opposite(solver):
-    """The exercise sets it onto the edge, the lesson a box away; velocity and the other coordinate
-    stay; a centre on the edge stays."""
+    # The exercise sets it onto the edge, the lesson a box away; velocity and the other coordinate
+    # stay; a centre on the edge stays.
     box = World(low=np.array([-5.0, -3.0]), high=np.array([5.0, 3.0]))
     disks = make_disks(
         [[4.75, 1], [1, -2.75], [-4.75, 2.75], [4.5, -1]],
@@ -278,8 +265,6 @@ def test_a_centre_beyond_an_edge_comes_in_opposite(solver):
 
 @both
 def test_coincident_centres_give_no_nan(solver):
-    """There is no normal to be had; the solver goes on with finite numbers, and the exercise parts
-    them along x."""
     disks = make_disks([[1, 1], [1, 1]], [[1, 0], [-1, 0]], [0.5, 0.5], [1, 1])
     world = World(walls=np.array([[[1.0, 1.0], [2.0, 1.0]]]))
     solver.advance(disks, world._replace(walls=np.zeros((0, 2, 2))), 0.0, 1)
@@ -292,7 +277,6 @@ def test_coincident_centres_give_no_nan(solver):
 
 @both
 def test_a_collision_leaves_the_spin_alone(solver):
-    """The exercise has no friction and no coupling of spin to collisions."""
     disks = make_disks(
         [[0, 0.1], [0.9, 0]], [[1, 0], [-1, 0]], [0.5, 0.5], [1, 3], angular_velocity=[4.0, -7.0]
     )

@@ -71,20 +71,17 @@ def scenes(draw):
 
 
 def copy_of(disks):
-    """The same disks in arrays of their own."""
     return type(disks)(*(array.copy() for array in disks))
 
 
 @njit(cache=True)
 def by_list(disks, world, dt, count):
-    """As `neighbours.advance`, however few the disks and steps are."""
     collisions = [(0, 0, 0, 0.0) for _ in range(0)]
     neighbours.advance_listed(disks, world, dt, count, collisions)
     return collisions
 
 
 def listed(disks, world, left=LASTS, dt=DT):
-    """The list of disks as they are now."""
     near = empty_list(disks.radius, len(world.walls))
     near.length[STRIDE] = neighbours.longest_stride(disks, dt)
     build_list(near, disks.position, disks.radius, world, left)
@@ -93,21 +90,18 @@ def listed(disks, world, left=LASTS, dt=DT):
 
 @njit(cache=True)
 def collide_once(disks, world, near, k, count):
-    """The collisions of one step of which the list is given."""
     collisions = [(0, 0, 0, 0.0) for _ in range(0)]
     neighbours.collide_near(disks, world, DT, near, k, 0, count, collisions)
     return collisions
 
 
 def same(a, b):
-    """Whether two sets of disks agree in every bit."""
     return all(one.tobytes() == other.tobytes() for one, other in zip(a, b))
 
 
 @steady
 @given(scene=scenes(), count=st.integers(1, 40))
 def test_a_list_gives_the_bits_and_the_collisions_of_all_pairs(scene, count):
-    """Positions, velocities, angles, and every collision in its order with its impulse."""
     disks, world = scene
     other = copy_of(disks)
     collisions = exercise.advance(disks, world, DT, count)
@@ -117,7 +111,6 @@ def test_a_list_gives_the_bits_and_the_collisions_of_all_pairs(scene, count):
 
 
 def heap(n=300, fill=3.0):
-    """Disks heaped upon each other at random, which projections throw about."""
     rng = np.random.default_rng(3)
     radius = rng.uniform(0.3, 1.0, n)
     side = np.sqrt(np.pi * (radius**2).sum() / fill)
@@ -125,8 +118,8 @@ def heap(n=300, fill=3.0):
 
 
 def test_a_disk_moved_beyond_the_skin_in_mid_step_rebuilds_the_list_at_once():
-    """In a heap the list is out of date before the first step ends; kept to its end, it would miss
-    pairs."""
+    # In a heap the list is out of date before the first step ends; kept to its end, it would miss
+    # pairs.
     world, first, renewed, stale = World(), heap(), heap(), heap()
     collisions = exercise.advance(first, world, DT, 1)
     for disks in renewed, stale:
@@ -145,7 +138,6 @@ def test_a_disk_moved_beyond_the_skin_in_mid_step_rebuilds_the_list_at_once():
 
 
 def test_a_disk_moves_by_less_than_half_the_skin_as_long_as_the_list_holds():
-    """Under gravity and through collisions, from one list to the next; measured the slow way."""
     scene = boxed_gas(100, 0.3)  # read-only walls would have the solver compiled once more
     disks = make_disks(scene.position, scene.velocity, scene.radius, scene.mass)
     world, lasted = (
@@ -172,7 +164,6 @@ def test_a_disk_moves_by_less_than_half_the_skin_as_long_as_the_list_holds():
 @pytest.mark.parametrize("n", [FEW, 500])
 @pytest.mark.parametrize("packing", [0.1, 0.3, 0.6])
 def test_the_near_pairs_are_all_pairs_within_the_skin_in_the_order_of_the_double_loop(packing, n):
-    """Counted the slow way, in a gas around the origin, where cells have negative numbers."""
     scene = boxed_gas(n, packing)
     position = scene.position - scene.position.mean(axis=0)
     disks = make_disks(position, scene.velocity, scene.radius, scene.mass)
@@ -187,8 +178,8 @@ def test_the_near_pairs_are_all_pairs_within_the_skin_in_the_order_of_the_double
 
 
 def test_a_list_is_made_for_the_steps_that_are_left_but_not_for_more_than_it_pays():
-    """Its skin is as thick as the fastest disk needs; thicker, a call of few steps would ask many
-    pairs in vain."""
+    # Its skin is as thick as the fastest disk needs; thicker, a call of few steps would ask many
+    # pairs in vain.
     scene, dt = boxed_gas(500, 0.3), DT / 8
     disks, world = make_disks(scene.position, scene.velocity, scene.radius, scene.mass), World()
     half_skin = {
@@ -202,7 +193,6 @@ def test_a_list_is_made_for_the_steps_that_are_left_but_not_for_more_than_it_pay
 
 @pytest.mark.parametrize("far", [1e12, 1e300, np.inf, np.nan])
 def test_a_disk_lost_in_space_leaves_no_list_but_the_same_bits(far):
-    """Nobody can say in which cell it is."""
     world, disks = World(walls=np.array([[[-1.0, -1.0], [30.0, -1.0]]])), heap(80, 0.7)
     disks.position[7] = [far, 0.0]
     other = copy_of(disks)
@@ -214,14 +204,12 @@ def test_a_disk_lost_in_space_leaves_no_list_but_the_same_bits(far):
 
 
 def test_disks_all_in_one_place_are_not_listed():
-    """Every pair is near: a list would be as long as the double loop, and hold memory besides."""
     disks = make_disks(np.zeros((300, 2)), np.zeros((300, 2)), np.ones(300), np.ones(300))
     assert not holds(listed(disks, World(), 1))
 
 
 @pytest.mark.parametrize("n", [3, 21, FEW, FEW + 1, 300, 1000])
 def test_a_gas_plays_as_by_all_pairs_on_both_sides_of_where_the_cells_begin(n):
-    """As the harness plays it: in several calls."""
     scene = boxed_gas(n, 0.3)
     first, other = (
         make_disks(scene.position, 5 * scene.velocity, scene.radius, scene.mass) for _ in range(2)
@@ -237,7 +225,6 @@ def test_a_gas_plays_as_by_all_pairs_on_both_sides_of_where_the_cells_begin(n):
 @pytest.mark.long  # both kernels are compiled once more, for 20 s
 @pytest.mark.parametrize("n", [3, 21, FEW, FEW + 1, 300, 1000])
 def test_a_gas_kept_in_float32_plays_as_by_all_pairs(n):
-    """Where every number rounds a billion times as much."""
     scene = boxed_gas(n, 0.3)
     disks = make_disks(scene.position, 5 * scene.velocity, scene.radius, scene.mass)
     first, other = (type(disks)(*(a.astype(np.float32) for a in disks)) for _ in range(2))

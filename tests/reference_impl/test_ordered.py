@@ -21,7 +21,6 @@ ROUNDING = 2.0**-53
 
 
 def played(scene, dt, steps, variant=ordered):
-    """The engine after so many steps."""
     engine = Reference(variant)
     engine.load(scene, dt)
     engine.step(steps)
@@ -53,11 +52,8 @@ CASES = [(1.0, 0.0, 10.0, 60), (0.9, -1.0, 4.0, 120)]
     "seeds", [range(3), pytest.param(range(20), marks=pytest.mark.slow)], ids=["3", "20"]
 )
 def test_the_asteroids_in_a_box_are_followed_to_rounding(e, gravity, t, rate, seeds):
-    """No 2^-53 of a metre stays one: it grows e-fold in about a second, so 1e-6 is what is left of
-    16 digits at 10 s.
-
-    By projection (`exercise`) the same scenes are off by a disk.
-    """
+    # No 2^-53 of a metre stays one: it grows e-fold in about a second, so 1e-6 is what is left of
+    # 16 digits at 10 s. By projection (`exercise`) the same scenes are off by a disk.
     scenes = [boxed_asteroids(seed, e, gravity) for seed in seeds]
     errors = [off(scene, t, rate) for scene in scenes]
     print(
@@ -70,7 +66,6 @@ def test_the_asteroids_in_a_box_are_followed_to_rounding(e, gravity, t, rate, se
 
 
 def dense_box():
-    """Six disks between walls, of which one is static."""
     return Scene(
         position=[[0.6, 0.6], [2.0, 0.9], [3.3, 0.7], [0.7, 2.2], [2.1, 2.3], [3.4, 2.2]],
         velocity=[[3.0, 1.0], [-2.0, 2.0], [1.0, -3.0], [2.5, 0.4], [0.0, 0.0], [-1.0, -2.0]],
@@ -83,8 +78,6 @@ def dense_box():
 
 @pytest.mark.parametrize("gravity", [0.0, -2.0])
 def test_all_the_collisions_of_one_long_step_come_in_their_order(gravity):
-    """One step of 0.6 s: a collision, whom it sends where, and the walls, a static disk and a
-    curved flight besides."""
     scene = replace(dense_box(), gravity=np.array([0.0, gravity]))
     events = EventEngine(scene)
     events.advance(0.6)
@@ -101,7 +94,6 @@ def test_all_the_collisions_of_one_long_step_come_in_their_order(gravity):
 
 @pytest.mark.parametrize("gravity", [0.0, -9.8])
 def test_a_disk_that_passes_through_another_a_wall_or_its_end_within_a_step_has_struck_it(gravity):
-    """At the end of the step they are far apart again, so the end alone would show nothing."""
     scene = Scene(
         position=[[0.0, 0.0], [1.0, 0.1], [0.0, 5.0], [0.0, 9.0]],
         velocity=[[40.0, 0.0], [0.0, 0.0], [40.0, 0.0], [40.0, 0.0]],
@@ -121,7 +113,6 @@ def test_a_disk_that_passes_through_another_a_wall_or_its_end_within_a_step_has_
 
 
 def test_a_centre_that_leaves_the_box_enters_it_opposite_at_that_instant():
-    """As the exact answer has it: the asteroids of the exercise, which wrap, for 2 s."""
     scene = replace(
         boxed_asteroids(1), walls=np.zeros((0, 2, 2)), wrap=np.array([[-5.0, -3.0], [5.0, 3.0]])
     )
@@ -134,8 +125,8 @@ def test_a_centre_that_leaves_the_box_enters_it_opposite_at_that_instant():
 
 
 def test_the_neighbour_list_leaves_every_bit_as_it_is():
-    """No list holds with a disk that is so far out that its place rounds by more than a skin: with
-    it all pairs are asked, though none meets it."""
+    # No list holds with a disk that is so far out that its place rounds by more than a skin: with
+    # it all pairs are asked, though none meets it.
     scene = boxed_asteroids(2, 0.9)
     by_list, by_all = Reference(ordered), Reference(ordered)
     by_list.load(scene, 1 / 60)
@@ -162,7 +153,6 @@ def test_the_neighbour_list_leaves_every_bit_as_it_is():
 
 
 def falling(height=1.0, e=0.5, gravity=-10.0):
-    """A ball above a floor."""
     return Scene(
         position=[[0.0, 0.25 + height]],
         velocity=[[0.0, 0.0]],
@@ -175,7 +165,7 @@ def falling(height=1.0, e=0.5, gravity=-10.0):
 
 
 def test_a_ball_that_bounces_ever_lower_comes_to_rest_when_it_should_and_carries_its_weight():
-    """t = sqrt(2 h / g) (1 + e) / (1 - e) after infinitely many bounces; here after a few."""
+    # t = sqrt(2 h / g) (1 + e) / (1 - e) after infinitely many bounces; here after a few.
     dt, rest = 1 / 60, np.sqrt(0.2) * 3
     engine = played(falling(), dt, int(rest / dt) + 2)
     bounces = len(engine.collisions())
@@ -196,11 +186,10 @@ def test_a_ball_that_bounces_ever_lower_comes_to_rest_when_it_should_and_carries
 def test_a_heap_takes_few_collisions_a_step_and_neither_overlaps_nor_gains_energy(
     seed,
 ):
-    """Thirty disks that fall onto each other. Beside the collisions, each contact that lasts has an
-    entry a step: fewer than three pairs a disk touch in a plane, and a disk touches one wall or so.
-
-    Each step leaves 2^-20 of g dt2 / 2 and of the radii at most (`COARSE`), 300 steps 300 times it.
-    """
+    # Thirty disks that fall onto each other. Beside the collisions, each contact that lasts has an
+    # entry a step: fewer than three pairs a disk touch in a plane, and a disk touches one wall or
+    # so. Each step leaves 2^-20 of g dt2 / 2 and of the radii at most (`COARSE`), 300 steps 300
+    # times it.
     rng = np.random.default_rng(seed)
     grid = np.stack(np.meshgrid(np.arange(6), np.arange(5)), -1).reshape(-1, 2)
     scene = Scene(
@@ -246,7 +235,6 @@ def steps_of(scene, dt, steps, variant=ordered):
 
 
 def column(masses, e=0.0, gap=0.0, friction=0.0):
-    """Disks of 0.5 m above each other on a floor, and as far apart as the gap."""
     n = len(masses)
     return Scene(
         position=np.stack([np.zeros(n), 0.5 + gap + np.arange(n) * (1 + gap)], axis=-1),
@@ -273,8 +261,8 @@ STACKS = {
 
 @pytest.mark.parametrize("name", STACKS)
 def test_a_stack_stands_neither_overlaps_nor_gains_energy(name):
-    """Each step may leave `EXACT` of a radius, and 2^-40 of g dt2 / 2 on top of it, 300 times; with
-    1e4 kg on 1 kg the rounding of the heavy one's push is 1e4 times as large."""
+    # Each step may leave `EXACT` of a radius, and 2^-40 of g dt2 / 2 on top of it, 300 times; with
+    # 1e4 kg on 1 kg the rounding of the heavy one's push is 1e4 times as large.
     engine, deepest, gain = steps_of(STACKS[name], 1 / 60, 300)
     assert deepest < 10 * ordered.EXACT
     assert gain < 10 * ordered.EXACT
@@ -285,15 +273,13 @@ def test_a_stack_stands_neither_overlaps_nor_gains_energy(name):
 
 
 def test_projection_pair_by_pair_overlaps_in_a_stack():
-    """The control of what a stack is measured by."""
     assert steps_of(STACKS["column_of_ten"], 1 / 60, 60, neighbours)[1] > 1e-2
 
 
 def test_a_disk_at_rest_beside_a_stack_stays_as_alone():
-    """To a few roundings a step: it is in no solution of the stack. Not to the bit: alone it has 8
-    collisions a step, beside the stack it shares 40; and there it may overlap by `EXACT`, so that a
-    rounding does not use up those of all.
-    """
+    # To a few roundings a step: it is in no solution of the stack. Not to the bit: alone it has 8
+    # collisions a step, beside the stack it shares 40; and there it may overlap by `EXACT`, so that
+    # a rounding does not use up those of all.
     stack, alone = column([1.0] * 4, e=0.5, gap=0.1), column([1.0], e=0.5, gap=0.3)
     both = {
         name: np.concatenate([getattr(stack, name), getattr(alone, name)])
@@ -307,8 +293,8 @@ def test_a_disk_at_rest_beside_a_stack_stays_as_alone():
 
 
 def test_a_contact_that_a_collision_opens_pushes_no_more():
-    """A disk that is struck after it was held flies off without the force: with it, this scene
-    gained up to 2e-3 of its energy in a step."""
+    # A disk that is struck after it was held flies off without the force: with it, this scene
+    # gained up to 2e-3 of its energy in a step.
     stack = column([1.0] * 5, e=1.0)
     scene = replace(
         stack,
@@ -338,16 +324,11 @@ def sliding_past(speed):
 
 @pytest.mark.parametrize("speed", [2.7, 5.7])
 def test_two_that_touch_and_slide_past_each_other_part_at_every_step_size(speed):
-    """They part as v2 / d = 14.6 m/s2 and more opens the gap, though rounding may say at first that
-    it closes.
-
-    The control slides with 4.5 m/s2 of it: it is held where it is.
-    """
+    # They part as v2 / d = 14.6 m/s2 and more opens the gap, though rounding may say at first that
+    # it closes. The control slides with 4.5 m/s2 of it: it is held where it is.
     rates = [20 * 1.01**k for k in range(300)]
 
     def pressed(speed):
-        """(300,) m, how much farther the disk is from the static one than in free flight, after a
-        step of each size."""
         x = np.array(
             [played(sliding_past(speed), 1 / rate, 1).read().position[0, 0] for rate in rates]
         )

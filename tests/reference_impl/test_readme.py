@@ -16,17 +16,14 @@ COMMON = {"__init__.py", "blocks.py", "compiled.py", "state.py"}  # of all solve
 
 
 def files_of(row: list[str]) -> list[str]:
-    """The files of a row of the table."""
     return re.findall(r"`(\w+\.py)`", row[0])
 
 
 def lines_in(files: list[str]) -> int:
-    """How many lines they have."""
     return sum(len((FOLDER / name).read_text("utf-8").splitlines()) for name in files)
 
 
 def test_every_solver_has_a_row_with_what_it_leaves_out():
-    """And no other file has one."""
     assert {name for row in ROWS for name in files_of(row)} == {
         path.name for path in FOLDER.glob("*.py")
     } - COMMON
@@ -35,7 +32,6 @@ def test_every_solver_has_a_row_with_what_it_leaves_out():
 
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: row[0])
 def test_a_solver_has_as_many_lines_as_its_row_and_its_engine_say(row: list[str]):
-    """Both are counted along with the files; the engine says what it leaves out, too."""
     files = files_of(row)
     summary = ENGINES[f"reference:{files[0].removesuffix('.py')}"].summary
 

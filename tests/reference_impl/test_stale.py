@@ -38,7 +38,6 @@ forget_stale(Path(__file__).parent)
 
 
 def test_what_was_kept_before_an_edit_is_deleted_and_nothing_else(tmp_path: Path):
-    """Of the folder, and where a folder that it imports has changed."""
     here, there = tmp_path / "here", tmp_path / "there"
     kept = here / "__pycache__" / "solver.step-1.nbi"
     for folder in (kept.parent, there):
@@ -58,7 +57,6 @@ def test_what_was_kept_before_an_edit_is_deleted_and_nothing_else(tmp_path: Path
 
 
 def printed(folder: Path, first: str, number: int) -> int:
-    """What a program prints whose kernel calls one of another file, which returns `number`."""
     (folder / "outer.py").write_text(OUTER.format(first=first)) if number == 1 else None
     (folder / "inner.py").write_text(INNER.format(number=number))
     done = subprocess.run(
@@ -78,7 +76,7 @@ def printed(folder: Path, first: str, number: int) -> int:
 def test_a_kernel_that_calls_an_edited_one_is_compiled_anew(
     tmp_path: Path, first: str, second_time: int
 ):
-    """The control: left to itself, numba goes on with the old number. The new one is longer: Python
-    itself knows a file that is edited within a second by its size."""
+    # The control: left to itself, numba goes on with the old number. The new one is longer: Python
+    # itself knows a file that is edited within a second by its size.
     assert printed(tmp_path, first, 1) == 1
     assert printed(tmp_path, first, 22) == second_time

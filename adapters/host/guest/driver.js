@@ -9,7 +9,7 @@ globalThis.exports = module.exports;
 globalThis.Refused = class extends Error {};
 Object.defineProperty(globalThis, "__host", { value: (() => {
   const { parse, stringify } = JSON;
-  const { keys, is, getPrototypeOf, setPrototypeOf, getOwnPropertyDescriptor, defineProperty } = Object;
+  const { keys, is, setPrototypeOf, getOwnPropertyDescriptor, defineProperty } = Object;
   const { captureStackTrace } = Error;
   const { apply, ownKeys } = Reflect;
   const { slice } = String.prototype;
@@ -59,17 +59,11 @@ Object.defineProperty(globalThis, "__host", { value: (() => {
     };
   }
   if (typeof atob === "undefined") {
-    const digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     globe.atob = (text) => {
-      const parts = [];
-      let bits = 0, held = 0, part = "";
-      for (let k = 0; k < text.length && text[k] !== "="; k++) {
-        bits = (bits << 6) | digits.indexOf(text[k]);
-        held += 6;
-        if (held >= 8) { held -= 8; part += String.fromCharCode((bits >> held) & 255); }
-        if (part.length > 8191) { parts.push(part); part = ""; }
-      }
-      return parts.join("") + part;
+      const bytes = Uint8Array.fromBase64(text);
+      let all = "";
+      for (let k = 0; k < bytes.length; k += 8192) all += String.fromCharCode(...bytes.subarray(k, k + 8192));
+      return all;
     };
   }
 
@@ -96,8 +90,10 @@ Object.defineProperty(globalThis, "__host", { value: (() => {
     original = snapshot();
   }
 
+  // The built-ins, and what each has.
   function snapshot() {
     const values = setPrototypeOf({}, null), names = keys(BUILT_IN);
+    for (let k = 0; k < names.length; k++) values[names[k]] = globe[names[k]];
     for (let k = 0; k < names.length; k++) {
       remember(values, names[k], BUILT_IN[names[k]]);
       if (BUILT_IN[names[k]].prototype) remember(values, names[k] + ".prototype", BUILT_IN[names[k]].prototype);
@@ -114,6 +110,12 @@ Object.defineProperty(globalThis, "__host", { value: (() => {
     }
   }
 
+  function differences(before, after) {
+    const names = keys(after), changes = empty();
+    for (let k = 0; k < names.length; k++) if (!is(before[names[k]], after[names[k]])) changes[changes.length] = names[k];
+    return changes;
+  }
+
   // `guest`: every name that may be a function of the exercise or of an engine, as it is found after the file.
   function bind(guest) {
     file = guest;
@@ -121,16 +123,7 @@ Object.defineProperty(globalThis, "__host", { value: (() => {
     const names = keys(file);
     for (let k = 0; k < names.length; k++) found += `${stringify(names[k])}:${typeof file[names[k]] === "function"},`;
     const models = typeof file.models === "string" ? stringify(file.models) : "null";
-    return `{${found}"models":${models},"replaced":[${list(replaced())}]}`;
-  }
-
-  function replaced() {
-    const current = snapshot(), paths = keys(current), names = keys(BUILT_IN), changes = empty();
-    for (let k = 0; k < names.length; k++) if (globe[names[k]] !== BUILT_IN[names[k]]) changes[changes.length] = names[k];
-    for (let k = 0; k < paths.length; k++) {
-      if (!is(current[paths[k]], original[paths[k]])) changes[changes.length] = paths[k];
-    }
-    return changes;
+    return `{${found}"models":${models},"replaced":[${list(differences(original, snapshot()))}]}`;
   }
 
   function list(names) {
@@ -212,12 +205,6 @@ Object.defineProperty(globalThis, "__host", { value: (() => {
     return values;
   }
 
-  function changed(before) {
-    const after = globals(), names = keys(after), changes = empty();
-    for (let k = 0; k < names.length; k++) if (before[names[k]] !== after[names[k]]) changes[changes.length] = names[k];
-    return changes;
-  }
-
   // Put functions that write down each call in the place of the file's own; a `const` one stays, and is not seen.
   function watch(calls) {
     const index = (s) => { for (let k = 0; k < spheres.length; k++) if (spheres[k] === s) return k; return -1; };
@@ -264,7 +251,7 @@ Object.defineProperty(globalThis, "__host", { value: (() => {
     } catch (error) { problem = described(error); }
     const strayed = !question.world && witness() !== known;
     return `{"states":${joined(states)},"returned":${returned},"strayed":${strayed},"strange":[${list(strange(spheres))}],`
-      + `"kept":[${list(changed(before))}],"calls":${joined(calls)},"error":${problem}}`;
+      + `"kept":[${list(differences(before, globals()))}],"calls":${joined(calls)},"error":${problem}}`;
   }
 
   // Questions, one after the other. What comes before a call that never comes back can still be had of `answers`.

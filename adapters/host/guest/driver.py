@@ -26,6 +26,7 @@ import socket
 import sys
 import traceback
 from base64 import b64encode
+from collections import namedtuple
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from importlib import import_module
@@ -38,8 +39,8 @@ from math import inf, isinf, nan
 from operator import index
 from threading import Thread
 from time import process_time
-from types import FrameType, ModuleType
-from typing import Any, NamedTuple
+from types import ModuleType
+from typing import Any
 
 PATIENCE = 3  # times its limit of processor time that a call may take by the clock
 LOAD_LIMIT = 3.0  # s; importing numba takes one
@@ -62,15 +63,13 @@ ENGINE = ("create", "step", "read", "collisions", "settings")
 
 
 class Failed(Exception):
-    """kind, what and the place in the guest's file, from 1; 0 if it is not known."""
-
     def __init__(self, kind: str, what: str, line: int = 0, column: int = 0) -> None:
         self.kind, self.what, self.line, self.column = kind, what[:LONGEST], line, column
 
 
 def stopped(limit: float, spent: float, when: str) -> Failed:
-    """A call that did not return: "waited" if the clock has ended it before it had half of its
-    processor time, `spent` s, as it does on a busy machine."""
+    # A call that did not return: "waited" if the clock has ended it before it had half of its
+    # processor time, `spent` s, as it does on a busy machine.
     kind = "waited" if spent < limit / 2 else "timeout"
     return Failed(kind, f"does not come back within {limit:g} s {when}")
 
@@ -79,13 +78,12 @@ def stopped(limit: float, spent: float, when: str) -> Failed:
 
 
 class Packages:
-    """Finds the named packages by their paths, so that no folder of packages is on the path."""
+    # Finds the named packages by their paths, so that no folder of packages is on the path.
 
     def __init__(self, files: dict[str, str]) -> None:
         self.files = files
 
     def find_spec(self, name: str, _path: Any = None, _target: Any = None) -> ModuleSpec | None:
-        """Called through `sys.meta_path`."""
         file = self.files.get(name)
         if file is None:
             return None
@@ -93,13 +91,12 @@ class Packages:
 
 
 class Neighbours(Loader):
-    """Finds the modules beside the guest's file, whose texts the parent has sent."""
+    # Finds the modules beside the guest's file, whose texts the parent has sent.
 
     def __init__(self, texts: dict[str, str], folder: str) -> None:
         self.texts, self.folder = texts, folder
 
     def find_spec(self, name: str, _path: Any = None, _target: Any = None) -> ModuleSpec | None:
-        """As Python finds it in a folder: a package, a module, or a namespace package."""
         place = name.replace(".", "/")
         for file, package in ((f"{place}/__init__.py", True), (f"{place}.py", False)):
             if file in self.texts:
@@ -108,7 +105,6 @@ class Neighbours(Loader):
         return ModuleSpec(name, None, is_package=True) if inside else None
 
     def exec_module(self, module: ModuleType) -> None:
-        """Run the text of a module."""
         assert module.__spec__ is not None
         file = str(module.__spec__.origin)
         module.__file__ = os.path.join(self.folder, file)
@@ -120,8 +116,8 @@ class Neighbours(Loader):
 
 
 class Fields:
-    """Named values that can be reached as attributes or as items: `sphere.position.x`,
-    `sphere["position"]["x"]`."""
+    # Named values that can be reached as attributes or as items: `sphere.position.x`,
+    # `sphere["position"]["x"]`.
 
     torque: float
 
@@ -139,7 +135,7 @@ class Fields:
 
 
 class Traced(Fields):
-    """The same, reporting every access to a number as ("r" or "w", the sphere's field)."""
+    # The same, reporting every access to a number as ("r" or "w", the sphere's field).
 
     def __init__(
         self, access: Callable[[str, str], None], values: dict[str, Any], within: str = ""
@@ -162,35 +158,30 @@ class Traced(Fields):
     __setitem__ = __setattr__
 
 
+VECTORS = ("position", "velocity", "force")
+SCALARS = ("alpha", "angularVelocity", "torque", "mass", "MoI", "size")
+
+
 def sphere_of(r: Sequence[float]) -> Fields:
-    """A sphere with the exercise's fields from its 12 numbers."""
-    names = ("alpha", "angularVelocity", "torque", "mass", "MoI", "size")
-    return Fields(
-        position=Fields(x=r[0], y=r[1]),
-        velocity=Fields(x=r[2], y=r[3]),
-        force=Fields(x=r[4], y=r[5]),
-        **dict(zip(names, r[6:])),
-    )
+    vectors = {name: Fields(x=x, y=y) for name, x, y in zip(VECTORS, r[:6:2], r[1:6:2])}
+    return Fields(**vectors, **dict(zip(SCALARS, r[6:])))
 
 
 NAMES = frozenset(vars(sphere_of([0.0] * 12)))
 
 
 def row_of(s: Any) -> list[float]:
-    """The 12 numbers of a sphere; NaN for a field that is not a number."""
+    # The 12 numbers of a sphere; NaN for a field that is not a number.
     try:
-        vectors = (s.position.x, s.position.y, s.velocity.x, s.velocity.y, s.force.x, s.force.y)
+        numbers = [x for name in VECTORS for v in [getattr(s, name)] for x in (v.x, v.y)]
     except AttributeError:
         raise AttributeError(
             "a sphere is left with a position, velocity or force that has no x and y"
         ) from None
-    return [
-        number(x) for x in (*vectors, s.alpha, s.angularVelocity, s.torque, s.mass, s.MoI, s.size)
-    ]
+    return [*map(number, numbers), *(number(getattr(s, name)) for name in SCALARS)]
 
 
 def number(x: Any) -> float:
-    """`x` as a float; NaN if it is not a number."""
     try:
         return float(x)
     except (TypeError, ValueError):
@@ -198,12 +189,10 @@ def number(x: Any) -> float:
 
 
 def motion(s: Any) -> tuple[float, float, float, float]:
-    """Position and velocity of a sphere."""
     return s.position.x, s.position.y, s.velocity.x, s.velocity.y
 
 
 def seed() -> None:
-    """Seed the random numbers, the same for every question and scene."""
     random.seed(1)
     if "numpy" in sys.modules:
         sys.modules["numpy"].random.seed(1)
@@ -213,7 +202,7 @@ def seed() -> None:
 
 
 class ExerciseWorld:
-    """A scene by the exercise's functions: integrate all, collide every pair i < j, wrap."""
+    # A scene by the exercise's functions: integrate all, collide every pair i < j, wrap.
 
     def __init__(self, guest: PythonGuest, scene: dict[str, Any]) -> None:
         self.file, self.scene = guest.file, scene
@@ -226,7 +215,6 @@ class ExerciseWorld:
         ]
 
     def step(self, count: int, forces: Any, held: bool) -> None:
-        """Forces act in the first step, or in all if held."""
         gx, gy = self.scene["gravity"]
         for k in range(count):
             for i, s in enumerate(self.spheres):
@@ -238,12 +226,13 @@ class ExerciseWorld:
                 for j in range(i + 1, len(self.spheres)):
                     self.collide(i, j)
             if self.scene["wrap"]:
-                for s in self.spheres:
-                    self.wrap(s.position, *self.scene["wrap"])
+                (left, bottom), (right, top) = self.scene["wrap"]  # as projectObjects
+                for p in (s.position for s in self.spheres):
+                    p.x = right if p.x < left else left if p.x > right else p.x
+                    p.y = top if p.y < bottom else bottom if p.y > top else p.y
             self.steps += 1
 
     def collide(self, i: int, j: int) -> None:
-        """Collide a pair, and record it if it overlapped or anything changed."""
         a, b = self.spheres[i], self.spheres[j]
         was_a, was_b = self.motions[i], self.motions[j]
         self.file["collide"](a, b)
@@ -259,48 +248,24 @@ class ExerciseWorld:
             numbers = map(number, (*was_a, *was_b, *is_a, *is_b))
             self.contacts.append([self.steps, i, j, *numbers])
 
-    @staticmethod
-    def wrap(p: Any, low: Sequence[float], high: Sequence[float]) -> None:
-        """As projectObjects: beyond an edge of the box, onto the opposite one."""
-        p.x = high[0] if p.x < low[0] else low[0] if p.x > high[0] else p.x
-        p.y = high[1] if p.y < low[1] else low[1] if p.y > high[1] else p.y
-
     def read(self) -> array.array[float]:
-        """x, y, u, v, angle and spin of all spheres."""
         rows = (row_of(s) for s in self.spheres)
         return array.array("d", [x for r in rows for x in (*r[:4], r[6], r[7])])
 
 
-class GuestDisks(NamedTuple):
-    """What `advance` of a file like those of reference_impl works on; see its state.py."""
-
-    position: Any
-    velocity: Any
-    force: Any
-    angle: Any
-    angular_velocity: Any
-    torque: Any
-    radius: Any
-    mass: Any
-    inertia: Any
-    remainder: Any
-
-
-class GuestWorld(NamedTuple):
-    """What all disks share; see state.py of reference_impl."""
-
-    restitution: float
-    gravity: Any
-    walls: Any
-    low: Any
-    high: Any
-    split: int = 0
-    approaching_only: bool = True
-    friction: float = 0.0
+# What `advance` of a file like those of reference_impl works on; see its state.py.
+GuestDisks = namedtuple(
+    "GuestDisks",
+    "position velocity force angle angular_velocity torque radius mass inertia remainder",
+)
+GuestWorld = namedtuple(
+    "GuestWorld",
+    "restitution gravity walls low high split approaching_only friction",
+    defaults=(0, True, 0.0),
+)
 
 
 def make_disks(np: Any, *columns: Any) -> GuestDisks:
-    """Disks without force: position, velocity, radius, mass, inertia, angle, angular velocity."""
     x, v, radius, mass, inertia, angle, spin = (np.array(c, float, order="C") for c in columns)
     zero = np.zeros(len(radius))
     return GuestDisks(
@@ -309,7 +274,7 @@ def make_disks(np: Any, *columns: Any) -> GuestDisks:
 
 
 class ArraysWorld:
-    """A scene by `advance(disks, world, dt, count)` on arrays, as in reference_impl."""
+    # A scene by `advance(disks, world, dt, count)` on arrays, as in reference_impl.
 
     def __init__(self, guest: PythonGuest, scene: dict[str, Any]) -> None:
         self.np = np = import_module("numpy")
@@ -326,7 +291,6 @@ class ArraysWorld:
         self.advance(self.disks, self.world, self.dt, 0)  # compiles, if it is compiled
 
     def step(self, count: int, forces: Any, held: bool) -> None:
-        """Forces act in the first step, or in all if held."""
         for times in [1, count - 1] if forces and not held else [count]:
             if forces:
                 self.disks.force[:] = [force[:2] for force in forces]
@@ -338,7 +302,6 @@ class ArraysWorld:
             self.steps, forces = self.steps + times, None
 
     def read(self) -> array.array[float]:
-        """x, y, u, v, angle and spin of all disks."""
         d = self.disks
         rows = self.np.column_stack([d.position, d.velocity, d.angle, d.angular_velocity])
         return array.array("d", rows.ravel().tolist())
@@ -375,7 +338,6 @@ def as_functions(module: ModuleType) -> dict[str, Callable[..., Any]]:
         return [module.ufo, *module.asteroids]
 
     def begin() -> None:
-        """A ufo and 20 asteroids in a grid, as the exercise's file has them."""
         places = [(-4.0 + 2.0 * (k % 5), -2.2 + 1.2 * (k // 5)) for k in range(20)]
         parked = [sphere_of([x, y, *[0.0] * 7, 1.0, 1.0, 0.1]) for x, y in places]
         ufo = sphere_of([-3.5, 0.0, *[0.0] * 7, 1.0, 1.0, 0.3])
@@ -391,8 +353,6 @@ def as_functions(module: ModuleType) -> dict[str, Callable[..., Any]]:
 
 
 class EngineWorld:
-    """A scene by the functions of an engine: create, step, read, perhaps collisions."""
-
     def __init__(self, guest: PythonGuest, scene: dict[str, Any]) -> None:
         self.guest, self.n, self.walls = guest, scene["n"], len(scene["walls"])
         self.dt, self.angle = scene["dt"], list(scene["angle"])
@@ -405,14 +365,11 @@ class EngineWorld:
             raise Failed("refused", self.world or "create returned an empty text")
 
     def call(self, name: str, *arguments: Any) -> Any:
-        """Call a function of the file and return its result."""
         self.guest.inside = name
         function, most = self.guest.file[name], self.guest.takes[name]
         return function(*arguments[:most])
 
     def step(self, count: int, forces: Any, held: bool) -> None:
-        """Forces act in the first step, or in all if held; a step may return a new world, which is
-        what `read` can read."""
         for k in range(count):
             acting = forces if forces and (held or k == 0) else None
             result = self.call(
@@ -427,25 +384,19 @@ class EngineWorld:
             self.steps += 1
 
     def is_world(self, result: Any) -> bool:
-        """Whether `read` can read it; if not, the step has to have moved the disks."""
+        # Whether `read` can read it; if not, the step has to have moved the disks.
         try:
             self.rows_of(result)
             return True
         except Exception:
             now, first = self.rows_of(self.world), self.first
-        if (
-            first
-            and [d[:2] for d in now] == [d[:2] for d in first]
-            and any(any(d[2:4]) for d in now)
-        ):
-            wanted = (
-                "expected is that it changes its world, or returns a new one that read can read"
-            )
-            raise wrong("step", result, wanted, " and moved no disk")
+        still = first and [d[:2] for d in now] == [d[:2] for d in first]
+        if still and any(any(d[2:4]) for d in now):
+            wanted = "it changes its world, or returns a new one that read can read"
+            raise wrong("step", result, f"expected is that {wanted}", " and moved no disk")
         return False
 
     def hear(self) -> None:
-        """Record the collisions of this step."""
         rows = self.call("collisions", self.world)
         if not hasattr(rows, "__len__") or isinstance(rows, (str, dict)):
             raise wrong("collisions", rows, COLLISION)
@@ -460,13 +411,11 @@ class EngineWorld:
             self.log.extend((self.steps, i, j, impulse))
 
     def read(self) -> array.array[float]:
-        """x, y, u, v, angle and spin of all disks."""
         rows = self.rows_of(self.world)
         self.first = self.first or rows
         return array.array("d", [x for disk in rows for x in disk])
 
     def rows_of(self, world: Any) -> list[list[float]]:
-        """The same, a row for each disk."""
         state = self.call("read", world)
         rows = [self.column(state, name, 2) for name in ("position", "velocity")]
         if self.guest.turns:
@@ -476,7 +425,6 @@ class EngineWorld:
         return [[x for values in disk for x in values] for disk in zip(*rows)]
 
     def column(self, state: Any, name: str, width: int) -> list[list[float]]:
-        """The numbers of all disks from the result of `read`."""
         wanted = f"expected is {'[x, y]' if width == 2 else 'a number'} for each of {self.n} disks"
         value = state.get(name) if isinstance(state, dict) else getattr(state, name, None)
         if value is None:
@@ -488,43 +436,40 @@ class EngineWorld:
                 wanted += "; create keeps disks of the scene before"
             raise wrong("read", value, wanted, f" as {name}")
         column = []
-        for i, disk in enumerate(value):
-            disk = disk.tolist() if hasattr(disk, "tolist") else disk
-            numbers = [disk] if width == 1 else disk
-            if not isinstance(numbers, (list, tuple)) or len(numbers) != width:
-                raise wrong("read", value, wanted, f" as {name}")
-            try:
+        try:
+            for i, disk in enumerate(value):
+                disk = disk.tolist() if hasattr(disk, "tolist") else disk
+                numbers = [disk] if width == 1 else disk
+                if not isinstance(numbers, (list, tuple)) or len(numbers) != width:
+                    raise TypeError
                 if any(isinstance(x, (str, bool, complex)) for x in numbers):
                     raise TypeError
                 column.append([float(x) for x in numbers])
-            except (TypeError, ValueError):
-                raise wrong("read", value, wanted, f" as {name}") from None
-            if not all(abs(x) < inf for x in column[-1]):
-                where = f" as {name} of disk {i}"
-                raise wrong("read", disk, "expected are finite numbers", where, "diverged")
+                if not all(abs(x) < inf for x in column[-1]):
+                    where = f" as {name} of disk {i}"
+                    raise wrong("read", disk, "expected are finite numbers", where, "diverged")
+        except (TypeError, ValueError):
+            raise wrong("read", value, wanted, f" as {name}") from None
         return column
 
 
 def wrong(function: str, value: Any, wanted: str, what: str = "", kind: str = "error") -> Failed:
-    """The failure for an invalid return value of a function."""
     text = repr(value)
     text = text if len(text) <= SHOWN else text[:SHOWN] + " ..."
     return Failed(kind, f"{function} returned {text}{what}; {wanted}")
 
 
 def most_arguments(function: Callable[..., Any]) -> int | None:
-    """How many a function takes; None if any number, or it is not known. As in JavaScript it need
-    not take all that it is given."""
+    # How many a function takes; None if any number, or it is not known. As in JavaScript it need
+    # not take all that it is given.
     try:
         kinds = [parameter.kind for parameter in inspect.signature(function).parameters.values()]
     except (TypeError, ValueError):
         return None
+    if inspect.Parameter.VAR_POSITIONAL in kinds:
+        return None
     positional = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
-    return (
-        None
-        if inspect.Parameter.VAR_POSITIONAL in kinds
-        else sum(map(positional.__contains__, kinds))
-    )
+    return sum(kind in positional for kind in kinds)
 
 
 # ---- a guest in Python --------------------------------------------------------------------------
@@ -542,12 +487,12 @@ class PythonGuest:
         self.order, folder = order, order["folder"] or ""
         self.name = os.path.join(folder, order["name"])
         self.neighbours = Neighbours(dict(order["imported"]), folder)
-        self.turns, self.inside, self.loads = False, "", 0
+        self.inside = ""
+        self.versions = {"python": ".".join(map(str, sys.version_info[:3]))}
         sys.meta_path.insert(0, self.neighbours)
         self.renew()
 
     def renew(self) -> None:
-        """Load the file and the modules beside it again, without any state of earlier calls."""
         for name, loaded in list(sys.modules.items()):
             if getattr(getattr(loaded, "__spec__", None), "loader", None) is self.neighbours:
                 del sys.modules[name]
@@ -561,7 +506,7 @@ class PythonGuest:
             exec(compile(self.order["text"], self.name, "exec", dont_inherit=True), vars(module))
         self.loads, names = 0, vars(module)
         if self.order["holder"]:  # a class has the functions, of itself or of its instances
-            names = self.methods_of(names[self.order["holder"]], "while it is loaded")
+            names = self.methods_of(names[self.order["holder"]])
         if self.order["engine"]:
             self.world_of: Any = EngineWorld
             self.file = {name: names[name] for name in ENGINE if callable(names.get(name))}
@@ -576,36 +521,28 @@ class PythonGuest:
         else:
             self.world_of = ExerciseWorld
             self.file = {k: names[f] for k, f in EXERCISE.items() if callable(names.get(f))}
-        self.functions: dict[str, Any] = {k: k in self.file for k in (*EXERCISE, *ENGINE)}
-        models = names.get("models")
-        self.functions |= {"replaced": [], "models": models if isinstance(models, str) else None}
-        self.functions["advance"] = self.world_of is ArraysWorld
+        models = names["models"] if isinstance(names.get("models"), str) else None
+        self.turns = "rotation" in (models or "").split()
+        self.functions: dict[str, Any] = {
+            **{name: name in self.file for name in (*EXERCISE, *ENGINE)},
+            "replaced": [],
+            "models": models,
+            "advance": self.world_of is ArraysWorld,
+        }
 
-    def methods_of(self, holder: type, when: str) -> dict[str, Any]:
-        """The functions of an engine that is a class."""
+    def methods_of(self, holder: type) -> dict[str, Any]:
         create = vars(holder)["create"]
-        own = (
-            inspect.isfunction(create)
-            and next(iter(inspect.signature(create).parameters), "") == "self"
-        )
-        with self.guarded(LOAD_LIMIT, when):
+        own = inspect.isfunction(create) and [*inspect.signature(create).parameters][:1] == ["self"]
+        with self.guarded(LOAD_LIMIT, "while it is loaded"):
             engine = holder() if own else holder
         return {
             name: getattr(engine, name) for name in (*ENGINE, "models") if hasattr(engine, name)
         }
 
     def run(self, command: str, argument: Any, limit: float) -> Any:
-        """The answer to a command; raises `Failed` after `limit` s, or if the file threw."""
         self.inside = ""
-        if command == "turns":
-            self.turns = bool(argument)
-            return None
         with self.guarded(limit, "in one call"):
-            return getattr(self, command)(argument)
-
-    def versions(self) -> dict[str, str]:
-        """The versions that affect the numbers."""
-        return {"python": ".".join(map(str, sys.version_info[:3]))}
+            return getattr(self, command)(*([] if argument is None else [argument]))
 
     @contextmanager
     def guarded(self, limit: float, when: str) -> Iterator[None]:
@@ -618,7 +555,7 @@ class PythonGuest:
             return stopped(limit, process_time() - began, when)
 
         try:
-            with system().stopped_after(limit, PATIENCE * limit, too_late):
+            with system.stopped_after(limit, PATIENCE * limit, too_late):
                 yield
         except BaseException as error:  # SystemExit too: a guest may not end the process
             failure = error if isinstance(error, Failed) else self.failure(error, when)
@@ -629,7 +566,6 @@ class PythonGuest:
             raise failure from None
 
     def failure(self, error: BaseException, when: str) -> Failed:
-        """An exception, with its place in the guest's file."""
         if isinstance(error, RecursionError):
             what = "calls itself without end (maximum recursion depth exceeded)"
         elif isinstance(error, MemoryError):
@@ -658,17 +594,14 @@ class PythonGuest:
 
     # ---- questions on spheres
 
-    def begin(self, _argument: Any) -> None:
-        """Let the file make its scene."""
+    def begin(self) -> None:
         if "begin" in self.file:
             self.file["begin"]()
 
     def everybody(self) -> list[Any]:
-        """The file's ufo and asteroids."""
         return [self.module.ufo, *self.module.asteroids]
 
-    def globals(self, _argument: Any = None) -> list[list[float]] | None:
-        """The numbers of the file's own spheres; None if it has none."""
+    def globals(self) -> list[list[float]] | None:
         try:
             return [row_of(s) for s in self.everybody()]
         except (AttributeError, TypeError):
@@ -695,7 +628,7 @@ class PythonGuest:
                 returned = returned or hasattr(result, "position")
                 spheres = self.everybody() if question["world"] else spheres
                 states.append([row_of(s) for s in spheres])
-        except (Failed, system().TimeIsUp):
+        except (Failed, system.TimeIsUp):
             raise
         except BaseException as raised:
             error = vars(self.failure(raised, "in one call"))
@@ -710,23 +643,20 @@ class PythonGuest:
             "error": error,
         }
 
-    def left(self, _argument: Any) -> list[list[float]]:
-        """The spheres of the last question, which a failed call may have changed."""
+    def left(self) -> list[list[float]]:
         return [row_of(s) for s in self.spheres]
 
     def call(self, name: str, arguments: list[Any], spheres: list[Any]) -> Any:
-        """Call a function of the file on some of the spheres, and return its result."""
         on = {"integrate": 1, "collide": 2}.get(name, 0)
         function = self.file["simulate" if name == "step" else name]
         return function(*(spheres[i] for i in arguments[:on]), *arguments[on:])
 
     def numbers(self) -> dict[str, str]:
-        """The file's global numbers as text; those that a call changes are its state."""
+        # The file's global numbers as text; those that a call changes are its state.
         values = vars(self.module).items()
         return {name: repr(x) for name, x in values if isinstance(x, (int, float, complex))}
 
     def watched(self, spheres: list[Any]) -> list[list[Any]]:
-        """A list that gets a row for every call of the file to its own functions."""
         calls: list[list[Any]] = []
         place = {id(s): k for k, s in enumerate(spheres)}
 
@@ -744,27 +674,23 @@ class PythonGuest:
         return calls
 
     def trace(self, question: dict[str, Any]) -> None:
-        """Make the calls of a question on spheres that record every read and write of their
-        numbers; `accesses` then returns these, even if a call never returned."""
         self.trail: list[tuple[str, int, str, list[int]]] = []
         seed()
         spheres = [self.traced(r, k) for k, r in enumerate(question["spheres"])]
         for name, *arguments in question["calls"]:
             self.call(name, arguments, spheres)
 
-    def accesses(self, _argument: Any) -> list[tuple[str, int, str, list[int]]]:
+    def accesses(self) -> list[tuple[str, int, str, list[int]]]:
         """("r" or "w", sphere, field, lines of the file, the innermost call first) of the last
         `trace`."""
         return self.trail
 
     def traced(self, numbers: list[float], k: int) -> Any:
-        """Sphere `k` that records its accesses."""
-
         def access(kind: str, field: str) -> None:
+            stack = traceback.walk_stack(sys._getframe(2))
+            lines = [line for frame, line in stack if frame.f_code.co_filename == self.name]
             last = len(self.trail) > MOST  # only the latest accesses of an endless loop are kept
-            self.trail[MOST if last else len(self.trail) :] = [
-                (kind, k, field, self.lines_of(sys._getframe(2)))
-            ]
+            self.trail[MOST if last else len(self.trail) :] = [(kind, k, field, lines)]
 
         sphere = sphere_of(numbers)
         for name, value in vars(sphere).items():
@@ -772,17 +698,7 @@ class PythonGuest:
                 vars(sphere)[name] = Traced(access, vars(value), name)
         return Traced(access, vars(sphere))
 
-    def lines_of(self, frame: FrameType | None) -> list[int]:
-        """The lines of the file in the calls that led to `frame`, the innermost first."""
-        lines = []
-        while frame is not None:
-            if frame.f_code.co_filename == self.name:
-                lines.append(frame.f_lineno)
-            frame = frame.f_back
-        return lines
-
     def placed(self, question: dict[str, Any]) -> list[Any]:
-        """The spheres of a question, new ones or the file's own."""
         made = [sphere_of(r) for r in question["spheres"]]
         if not question["world"]:
             return made
@@ -799,7 +715,6 @@ class PythonGuest:
     # ---- whole scenes
 
     def load(self, scene: dict[str, Any]) -> Any:
-        """Begin a scene; the settings of an engine."""
         seed()
         for name in ("mass", "inertia"):
             scene[name] = [inf if x is None else x for x in scene[name]]
@@ -812,17 +727,14 @@ class PythonGuest:
         return [[str(name), *pair] for name, *pair in self.file["settings"](self.world.world)]
 
     def step(self, argument: dict[str, Any]) -> None:
-        """Some steps; forces act in the first, or in all if held."""
         self.world.step(argument["count"], argument["forces"], argument.get("held", False))
 
     def play(self, calls: list[dict[str, Any]]) -> dict[str, Any]:
-        """Call `step` several times, then return the state and the new collisions."""
         for step in calls:
             self.step(step)
         return self.handed([self.world.read()])
 
     def samples(self, argument: dict[str, Any]) -> dict[str, Any]:
-        """The states at the beginning and after each of `times` calls of `step`."""
         readings = [self.world.read()]
         for _ in range(argument["times"]):
             self.step(argument["step"])
@@ -830,7 +742,6 @@ class PythonGuest:
         return self.handed(readings)
 
     def handed(self, readings: list[array.array[float]]) -> dict[str, Any]:
-        """Readings and the collisions since the last time, as the parent takes them."""
         numbers = array.array("d")
         for rows in (*readings, self.world.log[self.heard :]):
             numbers.extend(rows)
@@ -838,29 +749,24 @@ class PythonGuest:
         packed = b64encode(numbers.tobytes()).decode("ascii")
         return {"readings": len(readings), "thrown": None, "numbers": packed, "seconds": 0.0}
 
-    def contacts(self, _argument: Any) -> list[list[float]]:
-        """The first calls of the collision function on pairs that overlap or are changed."""
+    def contacts(self) -> list[list[float]]:
         return getattr(self.world, "contacts", [])
 
 
 # ---- the process --------------------------------------------------------------------------------
 
-_system: Any = None
+system: Any = None  # adapters/system.py, loaded by its path
 
 
-def system() -> Any:
-    """adapters/system.py, loaded by its path."""
-    return _system
-
-
-def main(settings: dict[str, Any]) -> None:
-    """Load the file in an order, report its functions, then answer requests until the end of the
-    input."""
-    global _system
-    requests, answers = private_pipes()
+def prepare(settings: dict[str, Any]) -> tuple[queue.SimpleQueue[bytes], int]:
+    global system
+    requests, answers = os.fdopen(os.dup(0), "rb"), os.dup(1)
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    for stream in range(3):  # input and output of the guest itself are discarded
+        os.dup2(nowhere, stream)
     lines: queue.SimpleQueue[bytes] = queue.SimpleQueue()
     sys.modules["driver"] = sys.modules["__main__"]
-    _system = load_file("system", settings["system"])
+    system = load_file("system", settings["system"])
     sys.meta_path.insert(0, Packages(settings["packages"]))
     for name in settings["preload"]:
         with suppress(ImportError):
@@ -872,6 +778,10 @@ def main(settings: dict[str, Any]) -> None:
     limit(settings)
     Thread(target=listen, args=(requests, lines), daemon=True).start()
     tell(answers, {"here": True, "can": attempts(settings["secret"])})
+    return lines, answers
+
+
+def serve(lines: queue.SimpleQueue[bytes], answers: int) -> None:
     guest: Any = None
     while True:
         request = loads(lines.get())
@@ -880,43 +790,27 @@ def main(settings: dict[str, Any]) -> None:
             continue
         try:
             order = request["open"]
-            guest = guest.renew() or guest if guest else make(order)
-            hello = {"functions": guest.functions, "versions": guest.versions()}
+            if guest:
+                guest.renew()
+            elif order["kind"] == "python":
+                guest = PythonGuest(order)
+            else:
+                guest = sys.modules["v8"].V8Guest(order)
+            hello = {"functions": guest.functions, "versions": guest.versions}
             tell(answers, {"id": request["id"], **hello})
         except Failed as failure:
             tell(answers, {"id": request["id"], "failed": vars(failure)})
             return
 
 
-def make(order: dict[str, Any]) -> Any:
-    """The guest of an order; raises `Failed`."""
-    if order["kind"] == "python":
-        return PythonGuest(order)
-    return sys.modules["v8"].V8Guest(order)
-
-
 def load_file(name: str, file: str) -> Any:
-    """A module from a file, wherever it is."""
-    spec = spec_from_file_location(name, file)
-    assert spec is not None
-    assert spec.loader is not None
+    spec: Any = spec_from_file_location(name, file)
     module = module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
 
 
-def private_pipes() -> tuple[Any, int]:
-    """The two pipes to the parent; output and input of the guest itself are discarded."""
-    requests, answers = os.fdopen(os.dup(0), "rb"), os.dup(1)
-    nowhere = os.open(os.devnull, os.O_RDWR)
-    for stream in range(3):
-        os.dup2(nowhere, stream)
-    return requests, answers
-
-
 def listen(requests: Any, lines: queue.SimpleQueue[bytes]) -> None:
-    """Pass on the lines of the parent; when it has closed the pipe, end this process and its
-    group."""
     for line in requests:
         lines.put(line)
     with suppress(AttributeError, OSError):  # Windows has no groups
@@ -925,9 +819,8 @@ def listen(requests: Any, lines: queue.SimpleQueue[bytes]) -> None:
 
 
 def limit(settings: dict[str, Any]) -> None:
-    """Bound memory, files and processes, and become another user if there is one."""
-    system().limit_memory(settings["memory"])
-    system().write_no_core()
+    system.limit_memory(settings["memory"])
+    system.write_no_core()
     if not settings["protected"]:
         return
     import resource
@@ -953,37 +846,23 @@ def limit(settings: dict[str, Any]) -> None:
 
 
 def attempts(secret: str) -> list[str]:
-    """What this process can still do of the things that a protected guest cannot, tried before
-    any text of a guest is there."""
-
-    def read() -> None:
-        with open(secret, "rb") as file:
-            file.read()
-
-    def signal_parent() -> None:
-        if os.getppid() in (0, 1):  # in a world of its own
-            raise PermissionError
-        os.kill(os.getppid(), 0)
-
-    def connect() -> None:
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
-            udp.connect(("192.0.2.1", 9))  # an address for documentation; nothing is sent
-
-    def write() -> None:
-        with open(secret + ".guest", "wb"):
-            pass
-        os.unlink(secret + ".guest")
-
+    # What this process can still do of the things that a protected guest cannot, tried before any
+    # text of a guest is there.
     possible = []
-    for name, attempt in {
-        "read": read,
-        "write": write,
-        "signal": signal_parent,
-        "network": connect,
-    }.items():
-        with suppress(OSError, AttributeError):
-            attempt()
-            possible.append(name)
+    with suppress(OSError), open(secret, "rb") as file:
+        file.read()
+        possible.append("read")
+    with suppress(OSError), open(secret + ".guest", "wb"):
+        possible.append("write")
+    with suppress(OSError):
+        os.unlink(secret + ".guest")
+    with suppress(OSError, AttributeError):
+        if os.getppid() not in (0, 1):  # else in a world of its own
+            os.kill(os.getppid(), 0)
+            possible.append("signal")
+    with suppress(OSError), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
+        udp.connect(("192.0.2.1", 9))  # an address for documentation; nothing is sent
+        possible.append("network")
     return possible
 
 
@@ -997,11 +876,14 @@ def reply(guest: Any, requests: list[Any]) -> list[dict[str, Any]]:
     alone = -1  # the question that stopped those after it
     while len(answers) < len(requests):
         k = len(answers)
-        if k != alone and not endless and (questions := questions_at(requests, k, guest)):
-            answers += guest.together(questions, requests[k][2] * TOGETHER)
-            alone = len(answers)
-            continue
         command, argument, seconds = requests[k]
+        if k != alone and not endless and hasattr(guest, "together"):
+            alike = list(takewhile(["ask", seconds].__eq__, (one[::2] for one in requests[k:])))
+            if len(alike) > 1:
+                questions = [question for _, question, _ in requests[k : k + len(alike)]]
+                answers += guest.together(questions, seconds * TOGETHER)
+                alone = len(answers)
+                continue
         calls = [call[0] for call in argument["calls"]] if command == "ask" else []
         known = next((endless[call] for call in calls if call in endless), None)
         try:
@@ -1018,17 +900,7 @@ def reply(guest: Any, requests: list[Any]) -> list[dict[str, Any]]:
     return answers
 
 
-def questions_at(requests: list[Any], k: int, guest: Any) -> list[Any]:
-    """The questions from number k on that can be asked together, if the guest takes several."""
-    if not hasattr(guest, "together"):
-        return []
-    alike = takewhile(lambda each: (each[0], each[2]) == ("ask", requests[k][2]), requests[k:])
-    questions = [argument for _, argument, _ in alike]
-    return questions if len(questions) > 1 else []
-
-
 def tell(answers: int, what: Any) -> None:
-    """One line to the parent."""
     data = memoryview(dumps(what).encode() + b"\n")
     while data:
         data = data[os.write(answers, data) :]
@@ -1037,7 +909,7 @@ def tell(answers: int, what: Any) -> None:
 if __name__ == "__main__":
     sys.dont_write_bytecode = True
     try:
-        main(loads(sys.argv[1]))
+        serve(*prepare(loads(sys.argv[1])))
     finally:
         # Without Python's own end: taking down a V8 that was stopped in an endless loop never
         # returns.

@@ -12,7 +12,7 @@ from contextlib import suppress
 from time import monotonic, perf_counter, process_time, sleep
 from typing import Any
 
-from driver import PATIENCE, Failed, stopped  # type: ignore[import-not-found]
+from driver import EXERCISE, PATIENCE, Failed, stopped  # type: ignore[import-not-found]
 from py_mini_racer import (
     JSEvalException,
     JSOOMException,
@@ -24,19 +24,13 @@ from py_mini_racer import (
 NAME = "solver-file"  # the name of the guest's text in stack traces
 with open(os.path.join(os.path.dirname(__file__), "driver.js"), encoding="utf-8") as _file:
     DRIVER = _file.read()
-FUNCTIONS = {
-    "integrate": "integrate",
-    "collide": "sphereSphereCollisionHandling",
-    "simulate": "performSimStep",
-    "wrap": "projectObjects",
-    "begin": "initScene",
-    **{name: name for name in ("create", "step", "read", "collisions", "models", "settings")},
-    **{name: name for name in ("place", "free", "ready")},
-}
+ENGINE = ("create", "step", "read", "collisions", "models", "settings", "place", "free", "ready")
+PLACE = re.compile(rf"{NAME}:(\d+):(\d+)")
 # Evaluated after the file, where its `let` and `const` are visible, too; a missing name fails
 # when it is used.
 VERBS = ", ".join(
-    f'{verb}: typeof {name} === "undefined" ? null : {name}' for verb, name in FUNCTIONS.items()
+    f'{verb}: typeof {name} === "undefined" ? null : {name}'
+    for verb, name in [*EXERCISE.items(), *zip(ENGINE, ENGINE)]
 )
 BIND = f"""__host("bind", {{ {VERBS},
   ufo: () => ufo, asteroids: () => asteroids,
@@ -75,59 +69,53 @@ class V8Guest:
     """
 
     def __init__(self, order: dict[str, Any]) -> None:
-        self.order = order
-        packaged = order.get("package") is not None
-        self.heap, self.load_limit = (512 * 2**20, 10.0) if packaged else (64 * 2**20, 2.0)
-        self.v8 = MiniRacer()
+        self.order, self.packaged = order, order["package"] is not None
+        self.heap, self.load_limit = (2**29, 10.0) if self.packaged else (2**26, 2.0)
         self.load()
+        self.versions = {"V8": self.v8.v8_version}
 
     def renew(self) -> None:
-        """Load the file into a new V8, without any state of earlier calls."""
         self.v8.close()
-        self.v8 = MiniRacer()
         self.load()
 
     def load(self) -> None:
-        """Load the file into an empty V8."""
+        self.v8 = MiniRacer()
         self.began = process_time()
         self.v8.set_hard_memory_limit(self.heap)
         self.v8.eval(DRIVER)
         try:
-            if self.order.get("package") is not None:
-                self.v8.eval(f"{self.order['package']}\n;0", timeout_sec=self.load_limit)
+            if self.packaged:
+                self.eval(f"{self.order['package']}\n;0")
             else:
                 self.v8.eval('__host("confine")')
                 for name, text in self.order["imported"]:
                     self.load_library(name, text)
-            self.v8.eval(f"{self.order['text']}\n//# sourceURL={NAME}", timeout_sec=self.load_limit)
+            self.eval(f"{self.order['text']}\n//# sourceURL={NAME}")
             bind = BIND_CLASS.format(self.order["holder"]) if self.order["holder"] else BIND
-            self.functions = json.loads(str(self.v8.eval(bind, timeout_sec=self.load_limit)))
-            self.wait_until_ready()
+            self.functions = json.loads(str(self.eval(bind)))
+            if self.order["engine"]:
+                turns = "rotation" in (self.functions["models"] or "").split()
+                self.v8.eval(f'__host("turns", {json.dumps(turns)})')
+            until = monotonic() + self.load_limit
+            while not self.v8.eval('__host("ready")'):  # V8 compiles WebAssembly in its own time
+                if monotonic() > until:
+                    raise Failed("timeout", f"is not ready within {self.load_limit:g} s")
+                sleep(0.002)
         except JSEvalException as error:
             raise self.failure(error, self.load_limit, "while it is loaded") from None
 
-    def wait_until_ready(self) -> None:
-        """WebAssembly is compiled by V8 in its own time."""
-        until = monotonic() + self.load_limit
-        while not self.v8.eval('__host("ready")'):
-            if monotonic() > until:
-                raise Failed("timeout", f"is not ready within {self.load_limit:g} s")
-            sleep(0.002)
+    def eval(self, code: str) -> object:
+        return self.v8.eval(code, timeout_sec=self.load_limit)
 
     def load_library(self, name: str, text: str) -> None:
-        """Load gl-matrix, as the exercise's page does before the file."""
         try:
-            self.v8.eval(f"{text}\n//# sourceURL={name}", timeout_sec=self.load_limit)
+            self.eval(f"{text}\n//# sourceURL={name}")
             self.v8.eval(TAKE_OUT)
         except JSEvalException as error:
             message = str(error).partition("\n")[0]
             raise Failed("error", f"calls {name}, which cannot be loaded ({message})") from None
 
     def run(self, command: str, argument: Any, limit: float) -> Any:
-        """The driver's answer to a command; raises `Failed` after `limit` s, or if the file
-        threw."""
-        if command == "turns":
-            return self.v8.eval(f'__host("turns", {json.dumps(argument)})')
         code = f'__host("{command}", {json.dumps(json.dumps(argument))})'
         began, self.began = perf_counter(), process_time()
         try:
@@ -150,23 +138,21 @@ class V8Guest:
         return result
 
     def read(self, command: str, answer: dict[str, Any]) -> Any:
-        """The value of an answer of the driver; raises `Failed` if the file threw."""
         if "failed" in answer:
             raise self.thrown(answer["failed"])
         done = answer["done"]
         if command == "accesses":
-            return [[*access[:3], lines_of(access[3])] for access in done]
+            return [[*each, [int(k) for k, _ in PLACE.findall(stack)]] for *each, stack in done]
         for part in ("error", "thrown"):
             if isinstance(done, dict) and done.get(part):
                 done[part] = vars(self.thrown(done[part]))
         return done
 
     def thrown(self, error: dict[str, str]) -> Failed:
-        """What the guest threw, and its place in the file; of an engine with the function."""
         what, inside = plainly(error["what"]), error["inside"]
         if inside and self.order["engine"]:
             what = f"{inside} {'' if what.startswith(('calls ', 'needs ')) else 'threw '}{what}"
-        place = re.search(rf"{NAME}:(\d+):(\d+)", error["stack"])
+        place = PLACE.search(error["stack"])
         line, column = (int(place[1]), int(place[2])) if place else (0, 0)
         return Failed(error["kind"], what, line, column)
 
@@ -189,7 +175,6 @@ class V8Guest:
         return replies
 
     def done(self, code: str, limit: float) -> Any:
-        """The result of driver code in which the file cannot have thrown."""
         return json.loads(str(self.v8.eval(code, timeout_sec=limit)))["done"]
 
     def evaluate(self, code: str, limit: float, may_repeat: bool) -> object:
@@ -204,12 +189,7 @@ class V8Guest:
                 raise
             return self.v8.eval(code, timeout_sec=(PATIENCE - 1) * limit)
 
-    def versions(self) -> dict[str, str]:
-        """The versions that affect the numbers."""
-        return {"V8": self.v8.v8_version}
-
     def failure(self, error: JSEvalException, limit: float, when: str) -> Failed:
-        """The message of V8, with line and column if known."""
         if isinstance(error, JSTimeoutException):
             return stopped(limit, process_time() - self.began, when)
         if isinstance(error, JSOOMException):
@@ -218,10 +198,8 @@ class V8Guest:
         place = re.match(r"[^\n]*?:(\d+): (.*)", first)
         if not place:
             return Failed("error", plainly(first))
-        caret = next(
-            (line for line in rest.splitlines() if line.strip() and set(line.strip()) == {"^"}), ""
-        )
-        stack = re.search(rf"{NAME}:(\d+):(\d+)", str(error))
+        caret = next((line for line in rest.splitlines() if set(line.strip()) == {"^"}), "")
+        stack = PLACE.search(str(error))
         line, column = int(place[1]), caret.find("^") + 1
         if stack and not isinstance(error, JSParseException):
             line, column = int(stack[1]), int(stack[2])
@@ -231,17 +209,11 @@ class V8Guest:
         return Failed("error", plainly(place[2]), line, column)
 
 
-def lines_of(stack: str) -> list[int]:
-    """The lines of the guest's file in a stack, the innermost call first."""
-    return [int(line) for line in re.findall(rf"{NAME}:(\d+):\d+", stack)]
-
-
 OUTSIDE = ("setTimeout", "setInterval", "fetch", "localStorage", "WebAssembly", "Intl")
 SCRIPT = "the exercise's page loads the file as a plain script, which has no modules; leave it out"
 
 
 def plainly(what: str) -> str:
-    """V8's message, with a hint if it alone does not help."""
     what = what.removeprefix("Uncaught ")
     if "Maximum call stack" in what:
         return "calls itself without end (maximum call stack size exceeded)"
@@ -250,8 +222,7 @@ def plainly(what: str) -> str:
     missing = re.match(r"ReferenceError: (\w+) is not defined", what)
     if missing and missing[1] in OUTSIDE:
         return f"{what}: a solver runs without page, network and clock"
-    if missing and missing[1] == "require":
-        return f"{what}: {SCRIPT}"
-    if re.match(r"SyntaxError: (?:Unexpected token 'export'|Cannot use import statement)", what):
+    modules = r"SyntaxError: (?:Unexpected token 'export'|Cannot use import statement)"
+    if (missing and missing[1] == "require") or re.match(modules, what):
         return f"{what}: {SCRIPT}"
     return what

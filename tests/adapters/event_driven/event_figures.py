@@ -64,14 +64,12 @@ def measured(
 
 
 def read() -> dict[float, dict[str, float]]:
-    """The table, by packing."""
     with TABLE.open() as file:
         rows = [{name: float(value) for name, value in row.items()} for row in csv.DictReader(file)]
     return {row["packing"]: row for row in rows}
 
 
 def main() -> None:
-    """Write the table."""
     rows = [measured(packing) for packing in PACKINGS]
     with TABLE.open("w", newline="") as file:
         writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")

@@ -81,7 +81,10 @@ def collisions_of(engine):
 
 
 def state_after(scene, until, torus=None, cell=0.0):
-    """The engine, and position and velocity at `until` s."""
     engine = EventEngine(scene, torus, cell)
     engine.advance(until)
     return engine, *engine.motion_at(until)
+
+
+def after(scene, until):
+    return state_after(scene, until)[1:]

@@ -19,30 +19,22 @@ from crosscheck2d.scenarios.model import Scenario, Scene
 from crosscheck2d.scenarios.no_truth import NoTruth
 from crosscheck2d.scenarios.truth.closed_forms import bouncing
 from crosscheck2d.scenarios.truth.exact import computed
-from tests.adapters.event_driven.gases import gas
+from tests.adapters.event_driven.gases import after, gas
 from tests.adapters.event_driven.test_brute_force import plain_kernels
 
 CROSS = [[[-1.0, -1.0], [1.0, 1.0]], [[-1.0, 1.0], [1.0, -1.0]]]
 
 
 def disk(position, velocity=(0.0, 0.0), restitution=0.0, **fields):
-    """One disk of radius 0.25 and mass 1 above crossing walls, unless said otherwise."""
     arrays = {"radius": [0.25], "mass": [1.0], "walls": CROSS, "gravity": [0.0, -2.0]}
     return Scene(
         position=[position], velocity=[velocity], restitution=restitution, **(arrays | fields)
     )
 
 
-def after(scene, until):
-    """Position and velocity at `until` s."""
-    engine = EventEngine(scene)
-    engine.advance(until)
-    return engine.motion_at(until)
-
-
 @pytest.mark.parametrize("e", [0.0, 0.02, 0.5, 0.9])
 def test_a_disk_comes_to_rest_between_crossing_walls(e):
-    """At radius times sqrt(2) above where they cross: it touches both, and lies still for good."""
+    # At radius times sqrt(2) above where they cross: it touches both, and lies still for good.
     x, v = after(disk([0.0, 2.0], [0.25, 0.0], e), 60.0)
     assert x[0] == pytest.approx([0.0, 0.25 * np.sqrt(2)], abs=1e-14)
     assert v.tolist() == [[0.0, 0.0]]
@@ -51,7 +43,7 @@ def test_a_disk_comes_to_rest_between_crossing_walls(e):
 @pytest.mark.parametrize("half", [0.2, 0.7, 1.3])
 @pytest.mark.parametrize("e", [0.0, 0.3, 0.7])
 def test_a_disk_comes_to_rest_in_a_wedge(half, e):
-    """Of any angle: at radius / sin of half of it from the tip."""
+    # Of any angle: at radius / sin of half of it from the tip.
     walls = [[[0.0, 0.0], [3 * side * np.sin(half), 3 * np.cos(half)]] for side in (1, -1)]
     x, v = after(disk([0.03, 1.9], [0.02, 0.0], e, walls=walls), 60.0)
     assert x[0] == pytest.approx([0.0, 0.25 / np.sin(half)], abs=1e-13)
@@ -59,8 +51,6 @@ def test_a_disk_comes_to_rest_in_a_wedge(half, e):
 
 
 def test_into_a_right_angle_both_axes_bounce_on_their_own():
-    """Each as a ball above a floor, in closed form, also when the other has come to rest
-    already."""
     e, acceleration = 0.5, np.array([3.0, 8.0])
     engine = EventEngine(
         disk([1.25, 1.75], [0.0, 0.0], e, walls=box([0, 0], [9, 9]), gravity=-acceleration)
@@ -84,8 +74,8 @@ def test_into_a_right_angle_both_axes_bounce_on_their_own():
     ],
 )
 def test_a_change_of_acceleration_takes_a_disk_out_of_its_corner(acceleration, moves):
-    """Which wall still bears it decides how it goes: a t2 / 2 along what is left of the
-    acceleration."""
+    # Which wall still bears it decides how it goes: a t2 / 2 along what is left of the
+    # acceleration.
     engine = EventEngine(
         disk([0.25, 0.25], walls=box([0, 0], [20, 20]), gravity=[-3.0, -8.0], restitution=0.5)
     )
@@ -98,8 +88,6 @@ def test_a_change_of_acceleration_takes_a_disk_out_of_its_corner(acceleration, m
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_in_an_obtuse_wedge_a_disk_slides_up_the_wall_that_holds_it_no_more(side):
-    """Of 120 degrees: turned by 45 degrees, the acceleration still presses it onto both walls, but
-    drives it up one of them."""
     walls = [[[0.0, 0.0], [3 * way * np.sin(np.pi / 3), 3 * np.cos(np.pi / 3)]] for way in (1, -1)]
     engine = EventEngine(disk([0.01, 1.0], walls=walls, gravity=[0.0, -8.0], restitution=0.5))
     engine.advance(5.0)
@@ -117,7 +105,6 @@ def test_in_an_obtuse_wedge_a_disk_slides_up_the_wall_that_holds_it_no_more(side
     ("place", "speed"), [((2.0, 0.25), (-3.0, 0.0)), ((0.25, 2.25), (0.0, -2.5))]
 )
 def test_a_collision_takes_a_disk_out_of_its_corner_as_the_exact_answer_has_it(place, speed):
-    """Along the floor, and along the side wall; one lies in the corner at the start, e = 0.8."""
     scene = Scene(
         position=[[0.25, 0.25], place],
         velocity=[[0.0, 0.0], speed],
@@ -137,7 +124,6 @@ def test_a_collision_takes_a_disk_out_of_its_corner_as_the_exact_answer_has_it(p
 
 
 def test_at_restitution_one_what_lies_at_the_start_stays():
-    """On the floor, in a corner, and sliding."""
     for gravity, speed in (((0.0, -8.0), 0.0), ((-3.0, -8.0), 0.0), ((0.0, -8.0), 1.0)):
         scene = disk([0.25, 0.25], [speed, 0.0], 1.0, walls=box([0, 0], [9, 9]), gravity=gravity)
         x, v = after(scene, 2.0)
@@ -167,8 +153,6 @@ SETTLING = Scene(
 
 
 def test_collisions_that_accumulate_are_refused_where_the_exact_answer_ends_too():
-    """A disk on the floor under another that settles on it and then would roll over it: the same
-    disks, the same instant."""
     record = computed(Scenario("settling", "?", "", SETTLING, 3.0, 0.05))
     engine = EventEngine(SETTLING)
     with pytest.raises(
@@ -182,7 +166,6 @@ def test_collisions_that_accumulate_are_refused_where_the_exact_answer_ends_too(
 
 
 def test_a_disk_driven_into_a_wall_by_another_is_refused():
-    """One without acceleration, between the wall and one that is."""
     scene = Scene(
         position=[[0.25, 0.0], [1.2, 0.0]],
         velocity=np.zeros((2, 2)),
@@ -201,8 +184,8 @@ def test_a_disk_driven_into_a_wall_by_another_is_refused():
 
 
 def test_a_bounce_off_the_end_of_a_wall_is_not_one_off_its_face():
-    """After it the disk is behind the line of the face, by more than rounding, until it has gone
-    past the end."""
+    # After it the disk is behind the line of the face, by more than rounding, until it has gone
+    # past the end.
     scene = disk(
         [1.5, 1.0], [-1.5, -1.0], 0.5, walls=[[[-4.0, 0.0], [1.0, 0.0]]], gravity=[0.0, -9.0]
     )
@@ -215,8 +198,6 @@ def test_a_bounce_off_the_end_of_a_wall_is_not_one_off_its_face():
 
 
 def test_more_collisions_than_can_be_followed_are_refused():
-    """A disk to and fro in a gap of a nanometre, a billion times a second: in less than a second of
-    work."""
     gap = 1e-9
     scene = disk(
         [0.25 + gap / 2, 0.0],
@@ -234,8 +215,6 @@ def test_more_collisions_than_can_be_followed_are_refused():
 
 
 def test_many_collisions_in_a_short_time_are_followed():
-    """31415 of a light disk between a wall and a heavy one: most of them within a ten-thousandth of
-    the time."""
     one = counting_pi(31415, 1e8, 31.0, (1,))
     engine = EventEngine(one.scene)
     engine.advance(31.0)
@@ -243,7 +222,6 @@ def test_many_collisions_in_a_short_time_are_followed():
 
 
 def test_what_would_take_for_ever_is_refused_though_it_is_no_collision():
-    """A thrust without measure makes a disk cross cell after cell."""
     engine = EventEngine(
         Scene(
             position=[[0.0, 0.0]], velocity=[[0.0, 0.0]], radius=[0.25], mass=[1.0], restitution=1.0
@@ -255,7 +233,6 @@ def test_what_would_take_for_ever_is_refused_though_it_is_no_collision():
 
 
 def test_the_loop_comes_back_to_python_and_goes_on_as_if_it_had_not(monkeypatch):
-    """After so many events as it is asked for, and with the same collisions as without a stop."""
     scene, torus = gas(100, 0.3)
     whole, parts = EventEngine(scene, torus), EventEngine(scene, torus)
     parts.arena.counters[LEFT] = 10
@@ -269,7 +246,6 @@ def test_the_loop_comes_back_to_python_and_goes_on_as_if_it_had_not(monkeypatch)
 
 
 def test_ctrl_c_is_taken_within_a_moment():
-    """In the middle of a gas that would go on for an hour."""
     scene, torus = gas(1000, 0.3)
     engine = EventEngine(scene, torus)
     engine.advance(0.1)
@@ -286,7 +262,6 @@ def test_ctrl_c_is_taken_within_a_moment():
 
 
 def all_in_plain_python():
-    """Some of the tests above."""
     test_a_disk_comes_to_rest_between_crossing_walls(0.5)
     test_a_disk_comes_to_rest_in_a_wedge(0.7, 0.0)
     test_a_change_of_acceleration_takes_a_disk_out_of_its_corner((2.0, -8.0), (2.0, 0.0))
@@ -298,7 +273,6 @@ def all_in_plain_python():
 
 @pytest.mark.slow
 def test_accumulation_in_plain_python_is_the_same(monkeypatch):
-    """So what the next test catches is the bug."""
     monkeypatch.setattr(events, "event_loop", plain_kernels())
     all_in_plain_python()
 
@@ -316,7 +290,6 @@ def test_accumulation_in_plain_python_is_the_same(monkeypatch):
     ],
 )
 def test_a_planted_bug_in_accumulation_is_caught(right, wrong, monkeypatch):
-    """By one of the tests above; less patience, for plain Python is slow."""
     monkeypatch.setattr(events, "event_loop", plain_kernels(right, wrong))
     monkeypatch.setattr(events, "MOST", 600)
     monkeypatch.setattr(events, "EVENTS", 200)

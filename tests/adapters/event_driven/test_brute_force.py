@@ -125,8 +125,6 @@ def random_scene(seed):
 
 
 def compare(seed):
-    """A random scene by the engine and by brute force: the first eight collisions, and the
-    positions after them."""
     scene, side = random_scene(seed)
     try:
         engine = EventEngine(scene, [[0, 0], [side, side]] if side else None)
@@ -146,7 +144,6 @@ def compare(seed):
 
 
 def compare_all(seeds):
-    """Compare one random scene after the other."""
     for seed in seeds:
         compare(seed)
 
@@ -155,11 +152,10 @@ def compare_all(seeds):
 @settings(derandomize=True)
 @given(st.integers(0, 2**32 - 1))
 def test_a_brute_force_algorithm_finds_the_same_collisions(seed):
-    """All pairs, all images, all walls and their ends; all roots at once."""
     compare(seed)
 
 
-FILES = ("contact_times", "queue", "disks", "search", "rest", "impacts", "loop")
+FILES = ("disks", "search", "rest", "impacts", "loop")
 DEAR = ("stale record kept", "wall end forgotten")  # a second each: of thirty scenes and more
 BUGS = {
     "stale record kept": ("b.count == a.partner_count", "True"),
@@ -184,7 +180,6 @@ BUGS = {
 
 
 def plain_kernels(right="", wrong=""):
-    """The kernels as plain Python, one line of them replaced."""
     folder = Path(events.__file__).parent
     source = "\n".join((folder / f"{name}.py").read_text() for name in FILES)
     ours = r"from crosscheck2d\.adapters\.event_driven\.\w+ import (\([^)]*\)|.*)"
@@ -202,7 +197,6 @@ def plain_kernels(right="", wrong=""):
 
 @pytest.mark.slow
 def test_the_kernels_as_plain_python_find_the_same(monkeypatch):
-    """So what the next test catches is the bug, and not the way it was planted."""
     monkeypatch.setattr(events, "event_loop", plain_kernels())
     compare_all(range(12))
 
@@ -211,7 +205,6 @@ def test_the_kernels_as_plain_python_find_the_same(monkeypatch):
     "bug", [pytest.param(bug, marks=[pytest.mark.slow] * (bug in DEAR)) for bug in BUGS]
 )
 def test_a_planted_bug_is_caught_by_brute_force(bug, monkeypatch):
-    """Each by a wrong list of collisions in one of forty scenes."""
     monkeypatch.setattr(events, "event_loop", plain_kernels(*BUGS[bug]))
     with pytest.raises((AssertionError, NoTruth)):
         compare_all(range(40))

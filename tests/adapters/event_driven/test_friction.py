@@ -22,17 +22,14 @@ EPS = float(np.finfo(float).eps)
 
 
 def asked(scene: Scene, duration: float = 2.0, thrusts: tuple[Thrust, ...] = ()) -> Scenario:
-    """The scene for so many s, with 32 samples."""
     return Scenario("asked", "?", "", scene, duration, duration / 32, thrusts=thrusts)
 
 
 def played(one: Scenario) -> Run:
-    """By the event engine."""
     return play(EventDriven(), "event_driven:float64", one, one.sample_interval)
 
 
 def trajectory(one: Scenario) -> Trajectory:
-    """Of the event engine, which plays it to the end."""
     run = played(one)
     assert run.status == "ok", run.reason
     assert run.trajectory is not None
@@ -50,7 +47,6 @@ def energy(scene: Scene, motion: Trajectory) -> Array:
 
 
 def gas(seed: int, restitution: float, walls: bool, gravity: float = 0.0) -> Scene:
-    """Six unequal spinning disks, in a box or free and on their way to each other."""
     draw = np.random.default_rng([5, seed])
     radius = draw.uniform(0.1, 0.4, 6)
     position = scatter(draw, [-1.5, -1.5], [1.5, 1.5], radius)
@@ -72,7 +68,6 @@ def gas(seed: int, restitution: float, walls: bool, gravity: float = 0.0) -> Sce
     seed=st.integers(0, 10**6), restitution=st.sampled_from([0.3, 0.9, 1.0]), walls=st.booleans()
 )
 def test_friction_never_adds_energy(seed: int, restitution: float, walls: bool):
-    """Of flight and spin together; and it takes some wherever disks meet."""
     scene = gas(seed, restitution, walls)
     motion = trajectory(asked(scene, 1.0))
     held = energy(scene, motion)
@@ -85,7 +80,6 @@ def test_friction_never_adds_energy(seed: int, restitution: float, walls: bool):
 @settings(max_examples=40, deadline=None, derandomize=True)
 @given(seed=st.integers(0, 10**6), restitution=st.sampled_from([0.0, 0.5, 1.0]))
 def test_free_disks_keep_momentum_and_angular_momentum(seed: int, restitution: float):
-    """About the origin, spins included, to rounding; and friction does change the spins."""
     scene = gas(seed, restitution, walls=False)
     run = played(asked(scene, 1.0))
     motion = run.trajectory
@@ -105,8 +99,6 @@ def test_free_disks_keep_momentum_and_angular_momentum(seed: int, restitution: f
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("restitution", [0.5, 1.0])
 def test_engine_and_oracle_agree_on_a_box_of_frictional_disks(seed: int, restitution: float):
-    """Two computations that share no code, up to the oracle's horizon; both forms of its numbers
-    too."""
     scene = gas(seed, restitution, walls=True)
     one = asked(scene, 2.0)
     motion, record = trajectory(one), computed(one)
@@ -154,8 +146,6 @@ ROLL = lay_out(
     ],
 )
 def test_engine_and_oracle_agree_on_what_slides_and_rolls(change, thrust):
-    """Back spin, top spin, other inertias, falls, thrusts and torques; off the end of a wall, and
-    on over a joint."""
     thrusts = () if thrust is None else (thrust,)
     one = asked(replace(ROLL, **{"inertia": None} | change), 2.0, thrusts)
     motion, record = trajectory(one), computed(one)
@@ -170,7 +160,6 @@ def test_engine_and_oracle_agree_on_what_slides_and_rolls(change, thrust):
 
 
 def test_what_rolls_has_no_slip_left_in_any_digit():
-    """In both, to the rounding of their spins; while it slides the slip is far from 0."""
     one = asked(ROLL, 4.0)
     for motion in (trajectory(one), computed(one).sampled(ROLL, (), one.times)):
         slip = motion.velocity[:, 0, 0] + 0.5 * motion.angular_velocity[:, 0]
@@ -212,8 +201,8 @@ TWO_CONTACTS = {
     ],
 )
 def test_two_contacts_that_last_are_refused_by_name(name: str, reason: str):
-    """The engine refuses rather than go on; so does the oracle, where friction acts. Without
-    friction, or without the second contact, both have an answer."""
+    # The engine refuses rather than go on; so does the oracle, where friction acts. Without
+    # friction, or without the second contact, both have an answer.
     scene = TWO_CONTACTS[name]
     assert reason in computed(asked(scene)).reason
     assert played(asked(scene)).status == "unsupported"
@@ -224,8 +213,6 @@ def test_two_contacts_that_last_are_refused_by_name(name: str, reason: str):
 
 
 def test_bounces_that_die_out_come_to_rest_with_slip_and_without():
-    """On a level floor the slip is gone after a bounce or two, and what follows is the closed form;
-    on an incline friction acts in every bounce, and the oracle follows them one by one."""
     fall = replace(ROLL, position=[[0.0, 1.5]], velocity=[[1.0, 0.0]])
     ramp = replace(fall, position=[[0.0, 3.0]], walls=[[[-64.0, 32.0], [64.0, -32.0]]])
 
@@ -234,7 +221,6 @@ def test_bounces_that_die_out_come_to_rest_with_slip_and_without():
 
 
 def test_a_bad_friction_is_one_sentence():
-    """Negative, infinite or no number; the control is a number of each kind that is one."""
     for bad in (-0.5, np.inf, -np.inf, np.nan, "rough", [0.1], True, 1j):
         said = r"^friction is .*, must be (a number )?at least 0 and finite$"
         with pytest.raises(ValueError, match=said):

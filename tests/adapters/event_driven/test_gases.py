@@ -11,7 +11,6 @@ from tests.adapters.event_driven.event_figures import PACKINGS, measured, read
 
 
 def check(row, tolerance):
-    """One row against the virial series, energy and momentum against rounding."""
     excess = compressibility(row["packing"]) - 1
     assert abs(row["Z"] - row["Z_reference"]) < tolerance * excess
     assert abs(row["rate"] / row["rate_reference"] - 1) < tolerance
@@ -20,15 +19,14 @@ def check(row, tolerance):
 
 
 def test_a_gas_has_the_pressure_energy_and_momentum_of_the_literature():
-    """A million collisions of 1024 disks at packing 0.3; 0.6 % is three times the statistical
-    error."""
+    # A million collisions of 1024 disks at packing 0.3; 0.6 % is three times the statistical error.
     check(measured(0.3, collisions=1_000_000), 0.006)
 
 
 @pytest.mark.parametrize("packing", PACKINGS)
 def test_the_committed_figures_are_those_of_the_literature(packing):
-    """Within four standard errors, reported by the blocks; Z is off by (Z - 1) / N at first order,
-    by the next one too."""
+    # Within four standard errors, reported by the blocks; Z is off by (Z - 1) / N at first order,
+    # by the next one too.
     row = read()[packing]
     assert row["collisions"] > 9.9e6
     for name in ("Z", "rate"):
@@ -48,8 +46,8 @@ def test_the_committed_figures_are_those_of_the_literature(packing):
     [PACKINGS[0], *(pytest.param(packing, marks=pytest.mark.long) for packing in PACKINGS[1:])],
 )
 def test_the_committed_figures_come_out_again(packing):
-    """Other code generation rounds otherwise, and chaos makes it another sample: within the errors
-    of both."""
+    # Other code generation rounds otherwise, and chaos makes it another sample: within the errors
+    # of both.
     row, new = read()[packing], measured(packing)
     for name in ("Z", "rate"):
         assert abs(new[name] - row[name]) < 4 * np.sqrt(2) * row[f"{name}_error"]

@@ -16,6 +16,7 @@ from crosscheck2d.scenarios.families.placing import box, scatter
 from crosscheck2d.scenarios.model import Scene
 from crosscheck2d.scenarios.no_truth import NoTruth
 from crosscheck2d.scenarios.truth.closed_forms import bouncing
+from tests.adapters.event_driven.gases import after
 from tests.adapters.event_driven.test_brute_force import plain_kernels
 
 G = 10.0
@@ -23,23 +24,15 @@ FLOOR = [[[-50.0, 0.0], [50.0, 0.0]]]
 
 
 def disks(position, velocity, restitution, **fields):
-    """Disks of radius 0.5 and mass 1 above a floor, unless said otherwise."""
     n = len(position)
     arrays = {"radius": np.full(n, 0.5), "mass": np.ones(n), "walls": FLOOR, "gravity": [0.0, -G]}
     return Scene(position=position, velocity=velocity, restitution=restitution, **(arrays | fields))
 
 
-def after(scene, until):
-    """Position and velocity at `until` s."""
-    engine = EventEngine(scene)
-    engine.advance(until)
-    return engine.motion_at(until)
-
-
 @pytest.mark.parametrize("e", [0.0, 0.1, 0.5, 0.9, 0.99])
 def test_a_bouncing_ball_follows_the_closed_form_into_rest(e):
-    """At any time, also between bounces a microsecond apart, and for ever after sqrt(2 h / g) (1 +
-    e) / (1 - e)."""
+    # At any time, also between bounces a microsecond apart, and for ever after sqrt(2 h / g) (1 +
+    # e) / (1 - e).
     end = np.sqrt(2 * 2.0 / G) * (1 + e) / (1 - e)
     engine = EventEngine(disks([[0.0, 2.5]], [[0.25, 0.0]], e))
     times = end * np.sort(
@@ -63,7 +56,7 @@ def test_a_bouncing_ball_follows_the_closed_form_into_rest(e):
 
 
 def test_bounces_down_an_incline_end_in_a_slide():
-    """On the line of slope -3/4: g cos(alpha) across it, g sin(alpha) along it, all the time."""
+    # On the line of slope -3/4: g cos(alpha) across it, g sin(alpha) along it, all the time.
     along, normal = np.array([0.8, -0.6]), np.array([0.6, 0.8])
     scene = disks([1.5 * normal], [[0.0, 0.0]], 0.5, walls=[[-20 * along, 60 * along]])
     end = 3 * np.sqrt(2 * 1.0 / (0.8 * G))
@@ -83,8 +76,8 @@ ON_A_LYING_DISK = {0.8: (0.638, 0.0144), 0.5: (0.21875, 0.046875)}
 
 @pytest.mark.parametrize("e", ON_A_LYING_DISK)
 def test_a_collision_on_a_lying_disk_is_the_limit_of_small_gaps(e):
-    """By hand for equal masses: at e = 0.8, (-1, 0), (-.1, -.9), (-.1, .72), (.638, -.018), (.638,
-    .0144)."""
+    # By hand for equal masses: at e = 0.8, (-1, 0), (-.1, -.9), (-.1, .72), (.638, -.018), (.638,
+    # .0144).
     start = np.sqrt(1 - 2 * G * 0.045)
     engine, at = (
         EventEngine(disks([[0.0, 0.5], [0.0, 1.545]], [[0, 0], [0, -start]], e)),
@@ -98,7 +91,6 @@ def test_a_collision_on_a_lying_disk_is_the_limit_of_small_gaps(e):
 
 @pytest.mark.parametrize(("e", "mass"), [(0.0, 1.0), (0.1, 1.0), (0.5, 10.0)])
 def test_a_collision_on_a_lying_disk_that_does_not_end_is_refused(e, mass):
-    """As many collisions at one instant as there are: when and whose."""
     scene = disks([[0.0, 0.5], [0.0, 2.0]], [[0, 0], [0, -1.0]], e, mass=[1.0, mass])
     with pytest.raises(
         NoTruth,
@@ -110,8 +102,6 @@ def test_a_collision_on_a_lying_disk_that_does_not_end_is_refused(e, mass):
 @settings(max_examples=60, deadline=None, derandomize=True)
 @given(st.integers(0, 2**32 - 1))
 def test_a_collision_on_a_lying_disk_is_one_on_a_disk_just_above_the_floor(seed):
-    """From any side, of any masses and radii: without gravity and 1e-12 m up, where there is no
-    rest, the same."""
     draw = np.random.default_rng(seed)
     radius, mass, angle = (
         draw.uniform(0.3, 1, 2),
@@ -139,8 +129,8 @@ def test_a_collision_on_a_lying_disk_is_one_on_a_disk_just_above_the_floor(seed)
 
 @pytest.mark.parametrize(("speed", "flies"), [(2.3, True), (2.2, False)])
 def test_over_the_end_of_its_wall_a_fast_disk_flies_and_a_slow_one_is_refused(speed, flies):
-    """It turns about the end, on a circle, if v2 < g r = 5 m2/s2; else its parabola never touches
-    the end again."""
+    # It turns about the end, on a circle, if v2 < g r = 5 m2/s2; else its parabola never touches
+    # the end again.
     scene = disks([[-1.0, 0.5]], [[speed, 0.0]], 0.5, walls=[[[-5, 0], [0, 0]]])
     if not flies:
         with pytest.raises(
@@ -161,7 +151,6 @@ def test_over_the_end_of_its_wall_a_fast_disk_flies_and_a_slow_one_is_refused(sp
     ids=["joined", "joined, the other way round", "overlapping", "twice"],
 )
 def test_a_slow_disk_goes_on_along_the_walls_that_continue_its_own(slope, pieces):
-    """As along a single wall: at rest on it, it passes their ends at 1 to 2 m/s."""
     start = [-1.0, -slope + 0.5 * np.hypot(1, slope) + 0.01]
     one, whole = (
         EventEngine(
@@ -186,8 +175,8 @@ def test_a_slow_disk_goes_on_along_the_walls_that_continue_its_own(slope, pieces
 
 
 def test_a_thrust_off_the_floor_lifts_a_lying_disk_and_one_into_it_does_not():
-    """2 m/s2 upward and to the right from 1 s to 2 s; the same twice as strong downward leaves it
-    where it is."""
+    # 2 m/s2 upward and to the right from 1 s to 2 s; the same twice as strong downward leaves it
+    # where it is.
     scene = disks([[0.0, 0.5]], [[0.0, 0.0]], 0.5)
     for upward, height in ((2.0, 1.0), (-4.0, 0.0)):
         engine = EventEngine(scene)
@@ -200,8 +189,6 @@ def test_a_thrust_off_the_floor_lifts_a_lying_disk_and_one_into_it_does_not():
 
 
 def test_lying_disks_collide_along_the_floor_and_stay_on_it():
-    """Head-on at e = 0.5, equal masses and radii: the normal is along the floor, to the last
-    bit."""
     scene = disks([[0.0, 0.5], [3.0, 0.5]], [[1.0, 0.0], [-1.0, 0.0]], 0.5)
     x, v = after(scene, 3.0)
     assert x.tolist() == [[0.0, 0.5], [3.0, 0.5]]
@@ -209,8 +196,6 @@ def test_lying_disks_collide_along_the_floor_and_stay_on_it():
 
 
 def test_without_mutual_help_nothing_stands_on_a_point_or_on_another_disk():
-    """Bounces on a wall's end, on a static disk, or of one disk on another have no rest:
-    refused."""
     pin = disks([[0.0, 2.0]], [[0.0, 0.0]], 0.5, walls=[[[0.0, -1.0], [0.0, 0.0]]])
     pile = disks([[0.0, 0.5], [0.0, 2.0]], [[0.0, 0.0], [0.0, 0.0]], 0.5)
     post = disks([[0.0, 0.5], [0.0, 2.0]], [[0.0, 0.0], [0.0, 0.0]], 0.5, mass=[np.inf, 1.0])
@@ -220,7 +205,6 @@ def test_without_mutual_help_nothing_stands_on_a_point_or_on_another_disk():
 
 
 def rain(seed, restitution, n=21):
-    """Disks falling in a box."""
     draw = np.random.default_rng(seed)
     radius = draw.uniform(0.08, 0.3, n)
     position = scatter(draw, [0.3, 0.3], [9.7, 5.7], radius)
@@ -237,7 +221,6 @@ def rain(seed, restitution, n=21):
 
 @pytest.mark.parametrize("seed", range(3))
 def test_while_a_box_settles_energy_only_falls_and_nothing_overlaps(seed):
-    """Up to where two disks come to rest on each other, which is refused."""
     scene = rain(seed, 0.5)
     engine, energy, at = EventEngine(scene), np.inf, 0.0
     i, j = np.triu_indices(scene.n, 1)
@@ -259,7 +242,6 @@ def test_while_a_box_settles_energy_only_falls_and_nothing_overlaps(seed):
 
 
 def test_a_settling_row_does_not_depend_on_order_or_handedness():
-    """Disks that drop onto a floor, come to rest and collide on it: shuffled, and in a mirror."""
     draw = np.random.default_rng(5)
     n = 8
     x = np.column_stack([np.arange(n) * 1.7, draw.uniform(0.6, 1.2, n)])
@@ -276,7 +258,6 @@ def test_a_settling_row_does_not_depend_on_order_or_handedness():
 
 
 def test_nothing_comes_to_rest_at_restitution_one():
-    """A ball that bounces for ever is not made to lie down: 2000 bounces, and its energy."""
     engine = EventEngine(disks([[0.0, 1.5]], [[0.0, 0.0]], 1.0))
     engine.advance(1790.0)
     x, v = engine.motion_at(1790.0)
@@ -286,13 +267,11 @@ def test_nothing_comes_to_rest_at_restitution_one():
 
 
 def play_all():
-    """Some of the tests above."""
     test_bounces_down_an_incline_end_in_a_slide()
     test_over_the_end_of_its_wall_a_fast_disk_flies_and_a_slow_one_is_refused(2.3, True)
 
 
 def test_rest_in_plain_python_is_the_same(monkeypatch):
-    """So what the next test catches is the bug."""
     monkeypatch.setattr(events, "event_loop", plain_kernels())
     play_all()
 
@@ -309,7 +288,6 @@ def test_rest_in_plain_python_is_the_same(monkeypatch):
     ],
 )
 def test_a_planted_bug_in_rest_is_caught(right, wrong, monkeypatch):
-    """By the slide down an incline, or the flight over the wall's end."""
     monkeypatch.setattr(events, "event_loop", plain_kernels(right, wrong))
     with pytest.raises((AssertionError, NoTruth)):
         play_all()
@@ -319,8 +297,8 @@ def test_a_planted_bug_in_rest_is_caught(right, wrong, monkeypatch):
 @pytest.mark.parametrize("share", [-1.5, -0.25, 0.25, 0.5, 0.75, 1.25, 2.5])
 @pytest.mark.parametrize("angle", [0.0, np.pi / 2, 1.0, 4.0])
 def test_a_tiny_wall_has_a_face_and_two_ends(length, share, angle):
-    """A disk that comes straight at it: it turns back where its foot lies on the wall, and beyond
-    that by the angle of the nearer end; float64 has one time for all three."""
+    # A disk that comes straight at it: it turns back where its foot lies on the wall, and beyond
+    # that by the angle of the nearer end; float64 has one time for all three.
     start, way = np.array([0.25, 0.5]), np.array([np.cos(angle), np.sin(angle)])
     end = start + length * way
     u = (end - start) / np.hypot(*(end - start))  # rounding turns so short a wall by up to 1e-7
@@ -342,7 +320,6 @@ def test_a_tiny_wall_has_a_face_and_two_ends(length, share, angle):
 
 
 def test_at_restitution_zero_a_disk_slides_past_both_ends_of_a_wall():
-    """Without gravity it keeps the speed along the wall, and touches nothing more."""
     draw = np.random.default_rng(1)
     for _ in range(40):
         angle, half = draw.uniform(0, 2 * np.pi), 10 ** draw.uniform(-7, -1)
@@ -371,8 +348,6 @@ def test_at_restitution_zero_a_disk_slides_past_both_ends_of_a_wall():
 
 
 def test_a_turned_floor_of_two_walls_is_a_floor():
-    """Rounding moves their joint off the line by an ulp: a disk that rests, bounces or slides over
-    it moves as on one wall, and does not fall through."""
     for seed in range(60):
         draw = np.random.default_rng([11, seed])
         angle, joint = draw.uniform(0, 2 * np.pi), draw.uniform(-0.5, 0.8)
@@ -395,7 +370,6 @@ def test_a_turned_floor_of_two_walls_is_a_floor():
 
 
 def test_walls_at_an_angle_share_no_surface_however_short_they_are():
-    """A kink of 1e-9 is none of rounding; nor is a corner with a side of 1e-15 m."""
     for kink, length in ((1e-9, 1.0), (1e-5, 1e-6), (1.0, 1e-15)):
         way = length * np.array([np.cos(kink), np.sin(kink)])
         walls = np.array([[[-1.0, 0.5], [0.0, 0.5]], [[0.0, 0.5], [0.0, 0.5] + way]])
@@ -403,7 +377,6 @@ def test_walls_at_an_angle_share_no_surface_however_short_they_are():
 
 
 def test_a_fan_of_many_walls_is_sorted_not_compared_in_pairs(monkeypatch: pytest.MonkeyPatch):
-    """A thousand walls that share an end."""
     asked, real = [], events.nearly_in_line
     monkeypatch.setattr(
         events, "nearly_in_line", lambda *pair: bool(asked.append(pair)) or real(*pair)
@@ -415,8 +388,7 @@ def test_a_fan_of_many_walls_is_sorted_not_compared_in_pairs(monkeypatch: pytest
 
 
 def test_the_line_of_each_wall_is_found_once(monkeypatch: pytest.MonkeyPatch):
-    """In rationals all pairs of some thousand walls would take minutes whenever a scene is
-    loaded."""
+    # In rationals all pairs of some thousand walls would take minutes whenever a scene is loaded.
     corners = 10.0 * np.exp(2j * np.pi * np.arange(401) / 400)
     ends = np.stack([corners.real, corners.imag], axis=-1)
     walls, asked = np.stack([ends[:-1], ends[1:]], axis=1), []
@@ -427,7 +399,6 @@ def test_the_line_of_each_wall_is_found_once(monkeypatch: pytest.MonkeyPatch):
 
 
 def test_walls_in_line_are_one_surface_up_to_a_gap():
-    """Upright, level and aslant; in any order, either way round; not what only crosses them."""
     along = np.array([[0, 1], [2, 1], [2, 4], [4, 3], [5, 6], [7, 6], [5.5, 5.75]])
     whole, alone = [0, 0, 0, 0, 4, 4, 4], [[[0.5, -9], [1, 9]], [[0, 1], [9, 8]]]
     for way in ([1.0, 0.0], [0.0, 1.0], [0.5, -2.0]):

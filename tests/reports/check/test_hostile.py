@@ -90,14 +90,6 @@ LOADING = {
         "import { vec2 } from './gl-matrix.js';\n" + JS,
         "plain script, which has no modules; leave it out",
     ),
-    "module.js": (
-        JS + "module.exports = { integrate };",
-        "module is not defined: the exercise's page loads",
-    ),
-    "page.js": (
-        "document.title = 'mine';\n" + JS,
-        "document is not defined: a solver runs without page",
-    ),
     "timer.js": (
         JS + "setTimeout(initScene, 1);",
         "setTimeout is not defined: a solver runs without page, network",
@@ -227,10 +219,6 @@ CALLS = {
     "array.js": (
         within(JS, "integrate", "sphere.position = [1, 2];"),
         "position: it is not a number",
-    ),
-    "clock.js": (
-        within(JS, "integrate", "var t = Date.now();"),
-        "without page, network and clock",
     ),
     "endless_integrate.py": (
         within(PY, "integrate", "    while True: pass"),

@@ -169,7 +169,7 @@ def test_a_worker_whose_parent_is_gone_ends_in_an_endless_loop_too(tmp_path: Pat
     """V8 stops the loop after its limit; nobody is there to hear it, and no process is left
     behind."""
     (tmp_path / "Exercise.js").write_text("while (true) {}")
-    how = start(Level.NONE, "javascript", (), None, False)
+    how = start(Level.NONE, "javascript", (), None)
     worker = subprocess.Popen(
         how.command,
         env=how.environment,

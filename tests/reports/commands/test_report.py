@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.adapters.play import play
-from crosscheck2d.reports.commands.medians import medians, numbers_of_scenes
+from crosscheck2d.reports.commands.run import medians, numbers_of_scenes
 from crosscheck2d.reports.compare.comparison import Comparison, compare
 from crosscheck2d.reports.page.scenes import SceneScores, scenes_of
 from crosscheck2d.scenarios.catalogue import scenario
@@ -15,19 +15,16 @@ NAMES = ("reference:exercise", "pymunk:matched")
 
 
 def compared(name: str, answered: bool = True) -> Comparison:
-    """A scene through two engines at one step size."""
     one = replace(scenario(name), substeps=(1,))
     one = one if answered else replace(one, truth=None, without_truth="it has none here")
     return compare(one, [play(ENGINES[name].make(), name, one, one.dt(1)) for name in NAMES])
 
 
 def scenes(*names: str) -> list[SceneScores]:
-    """Scenes through both engines."""
     return scenes_of(compared(name) for name in names)
 
 
 def test_the_last_row_counts_the_scenes_of_each_median():
-    """A scene without an exact answer has no error of position, but one of energy."""
     unanswered = scenes_of([compared("head_on_equal_e1", answered=False)])
     many = [*scenes("head_on_equal_e09", "oblique_e09"), *unanswered]
     headings, rows, _ = medians(many, NAMES, set())
@@ -40,21 +37,18 @@ def test_the_last_row_counts_the_scenes_of_each_median():
 
 
 def test_the_summary_of_one_scene_has_no_counts():
-    """All numbers are of that scene."""
     _, rows, _ = medians(scenes("head_on_equal_e09"), NAMES, set())
 
     assert [row[0] for row in rows] == [*NAMES]
 
 
 def test_engines_that_are_judged_in_different_scenes_give_a_range():
-    """One without a number is left out of it."""
     assert numbers_of_scenes([7, 5, 8, 0]) == "5–8"
     assert numbers_of_scenes([7]) == "7"
     assert numbers_of_scenes([]) == ""
 
 
 def test_who_models_no_friction_has_no_row_and_no_failure():
-    """It is named below the numbers; of scenes without friction it has a row."""
     _, rows, without = medians(scenes("friction_bounce_e1_mu01", "slip_to_roll"), NAMES, set())
 
     assert without == [NAMES[0]]
@@ -63,7 +57,6 @@ def test_who_models_no_friction_has_no_row_and_no_failure():
 
 
 def test_an_engine_that_breaks_the_protocol_is_not_scored():
-    """Its row says so; what it did not play is still counted."""
     _, rows, _ = medians(scenes("oblique_e09"), NAMES, {NAMES[1]})
 
     assert set(rows[1][1:-1]) == {"breaks"}

@@ -28,7 +28,6 @@ ON_GRID = 1e-6  # of a step: a collision that is as near to the end of one was f
 
 
 def the_same(w: int, _x: Array, _walls: Array, _truth: bool) -> Sequence[int]:
-    """The wall that was struck is the wall that is struck."""
     return (w,)
 
 
@@ -58,7 +57,6 @@ class Change:
     thrusts: Callable[[Sequence[Thrust]], Sequence[Thrust]] = field(default=lambda thrusts: thrusts)
 
     def way(self, vectors: Array) -> Array:
-        """(..., 2), flipped and turned, in the old units."""
         c, s = np.cos(self.turn), np.sin(self.turn)
         x, y = vectors[..., 0], vectors[..., 1] * self.flip
         if not self.turn:  # exactly, so that what stands upright goes on doing so
@@ -66,16 +64,13 @@ class Change:
         return np.stack([c * x - s * y, s * x + c * y], axis=-1)
 
     def place(self, x: Array, t: Array | float = 0.0) -> Array:
-        """(..., 2) m; t (...) s in the new units."""
         moved = np.asarray(t)[..., None] * np.array(self.boost) if any(self.boost) else 0.0
         return self.length * self.way(np.asarray(x)) + np.array(self.shift) + moved
 
     def speed(self, v: Array) -> Array:
-        """(..., 2) m/s."""
         return self.length / self.time * self.way(np.asarray(v)) + np.array(self.boost)
 
     def scene(self, scene: Scene) -> Scene:
-        """The scene, stated otherwise."""
         order = self.order(scene.n)
         unit = self.length / self.time
         velocity = np.where(scene.static[:, None], 0.0, self.speed(scene.velocity))
@@ -95,7 +90,6 @@ class Change:
         )
 
     def thrust(self, thrust: Thrust, n: int) -> Thrust:
-        """The thrust, stated otherwise; one that turns with its disk only flips."""
         flipped = (
             thrust.force * [1, self.flip] if thrust.frame == "body" else self.way(thrust.force)
         )
@@ -107,7 +101,6 @@ class Change:
         )
 
     def scenario(self, one: Scenario) -> Scenario:
-        """The scenario, with its exact answer stated otherwise."""
         thrusts = [self.thrust(thrust, one.scene.n) for thrust in self.thrusts(one.thrusts)]
         new = replace(
             one,
@@ -173,14 +166,11 @@ class Change:
         return Collisions.of(rows)
 
     def run(self, run: Run, one: Scenario) -> Run:
-        """A run, stated otherwise."""
-        assert run.trajectory is not None
         times = np.arange(len(run.trajectory)) * (self.time * one.sample_interval)
         new = self.trajectory(run.trajectory, one, times, run.dt)
         return replace(run, dt=self.time * run.dt, trajectory=new)
 
     def factor(self, unit: str) -> float:
-        """By how much a number of this unit is to change."""
         rates = {
             "m": self.length,
             "m/s": self.length / self.time,
@@ -195,13 +185,11 @@ CUT = 0.37  # of each wall
 
 
 def in_two(walls: Array) -> Array:
-    """Each wall as two, one after the other."""
     at = walls[:, :1] + CUT * (walls[:, 1:] - walls[:, :1])
     return np.concatenate([walls[:, :1], at, at, walls[:, 1:]], axis=1).reshape(-1, 2, 2)
 
 
 def which_half(w: int, x: Array, walls: Array, _truth: bool) -> Sequence[int]:
-    """The half of a wall that was cut in two at which a disk is."""
     along = walls[w, 1] - walls[w, 0]
     return (2 * w + int((x - walls[w, 0]) @ along > CUT * (along @ along)),)
 
@@ -212,13 +200,11 @@ def both(w: int, _x: Array, walls: Array, truth: bool) -> Sequence[int]:
 
 
 def one_after_the_other(thrusts: Sequence[Thrust]) -> Sequence[Thrust]:
-    """Each thrust as two, the second from where the first ends."""
     halves = [(t, t.start + CUT * (t.stop - t.start)) for t in thrusts]
     return [part for t, at in halves for part in (replace(t, stop=at), replace(t, start=at))]
 
 
 def side_by_side(thrusts: Sequence[Thrust]) -> Sequence[Thrust]:
-    """Each thrust as two at once, that share its force."""
     return [
         replace(t, force=p * t.force, torque=p * t.torque) for t in thrusts for p in (CUT, 1 - CUT)
     ]

@@ -10,7 +10,7 @@ import pytest
 from crosscheck2d.adapters.play import play
 from crosscheck2d.reports.compare.comparison import compare
 from crosscheck2d.reports.compare.metrics import METRICS
-from crosscheck2d.reports.compare.scales import top_speed
+from crosscheck2d.reports.compare.scales import top_speeds
 from crosscheck2d.scenarios.catalogue import SCENARIOS, scenario
 from crosscheck2d.scenarios.model import Scenario, Trajectory
 from tests.adapters.broken_engines import DoublesSpeed, Exact, Freezes, GainsEnergy
@@ -32,9 +32,6 @@ VELOCITIES = (
 
 
 def scaled(factor: float) -> Callable[[Trajectory], Trajectory]:
-    """The truth, all of whose velocities are `factor` times as large after the start; the positions
-    know nothing."""
-
     def corrupt(truth: Trajectory) -> Trajectory:
         size = np.append(1.0, np.full(len(truth) - 1, factor))
         spin = truth.angular_velocity * size[:, None]
@@ -51,10 +48,9 @@ CONTROLS = {
 
 
 def largest(one: Scenario, dt: float, played: Trajectory, truth: Trajectory) -> float:
-    """The largest of the metrics of velocity, momentum and energy, each relative."""
     beside = beside_truth(one, dt, played, truth)
     found = {name: METRICS[name].of(beside) for name in VELOCITIES}
-    fastest = top_speed(one).max() or 1.0
+    fastest = top_speeds(one)[0].max() or 1.0
     relative = [
         abs(one.value) / (fastest if "velocity" in name else 1)
         for name, one in found.items()
@@ -68,8 +64,6 @@ def largest(one: Scenario, dt: float, played: Trajectory, truth: Trajectory) -> 
 def test_a_wrong_velocity_is_caught_at_every_step_size_even_where_all_positions_are_right(
     name: str, control: str
 ):
-    """Of velocity, momentum or energy, in a crowd and at the coarsest step too; the truth itself
-    reads 0."""
     one, truth = truth_of(name)
     assert truth.velocity.any() or truth.angular_velocity.any()
     for substeps in one.substeps:
@@ -83,7 +77,6 @@ def test_a_wrong_velocity_is_caught_at_every_step_size_even_where_all_positions_
 
 @pytest.mark.parametrize("name", sorted(STILL))
 def test_what_stands_still_is_not_to_be_caught(name: str):
-    """That these scenes are left out is the scenes' doing: nothing moves in their truth."""
     _, truth = truth_of(name)
 
     assert not truth.velocity.any()
@@ -95,8 +88,6 @@ def test_what_stands_still_is_not_to_be_caught(name: str):
     "name", [name if name in FEW else pytest.param(name, marks=pytest.mark.long) for name in MOVING]
 )
 def test_an_engine_that_does_so_is_caught_in_the_tables(name: str, make: type[Exact]):
-    """Played and compared as any engine: by energy or momentum, wherever the disks are; the sound
-    one reads less."""
     one = replace(scenario(name), substeps=(scenario(name).substeps[0],))
     dt = one.dt(one.substeps[0])
     tables = [
@@ -111,3 +102,36 @@ def test_an_engine_that_does_so_is_caught_in_the_tables(name: str, make: type[Ex
     # begun.
     assert excess[["energy_error", "energy_deviation", "momentum_deviation"]].max() > 1e-3
     assert np.isfinite(wrong["velocity_max"])
+
+
+# Spins.
+
+SPINNING = ("spin_under_torque", "body_frame_thrust", "ship_thrust")
+
+
+@pytest.mark.parametrize("name", SPINNING)
+@pytest.mark.parametrize("factor", [0.0, 1.01, 2.0])
+def test_a_wrong_angular_velocity_is_caught_even_where_all_angles_are_right(
+    name: str, factor: float
+):
+    one, truth = truth_of(name)
+    spin = truth.angular_velocity
+    for dt in map(one.dt, one.substeps):
+        read = [
+            beside_truth(one, dt, each, truth)
+            for each in (replace(truth, angular_velocity=spin * factor), truth)
+        ]
+        wrong, right = (METRICS["angular_velocity_max"].of(view) for view in read)
+        blind = METRICS["angle_max"].of(read[0])
+
+        # what is near the end is not judged
+        assert wrong.value > 0.9 * abs(factor - 1) * np.abs(spin[1:-4]).max()
+        assert wrong.note == right.note == read[0].carried(read[0].judged_spin)
+        assert (right.value, blind.value) == (0, 0)
+
+
+def test_a_spin_is_judged_as_the_velocity_is():
+    for name in ("falling_box", "head_on_equal_e05", "spin_under_torque"):
+        one, truth = truth_of(name)
+        view = beside_truth(one, one.dt(1), truth, truth)
+        assert METRICS["angular_velocity_max"].of(view) == METRICS["velocity_max"].of(view)

@@ -6,12 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from crosscheck2d.adapters.engines import ENGINES
-from crosscheck2d.adapters.play import play
-from crosscheck2d.reports.compare import delays, laws, scales, view
-from crosscheck2d.reports.compare.comparison import compare
+from crosscheck2d.reports.compare import laws, scales
+from crosscheck2d.reports.compare.collisions import WINDOW
 from crosscheck2d.reports.compare.delays import (
-    WINDOW,
     distance_to_range,
     jumps_of,
     nearest,
@@ -19,23 +16,18 @@ from crosscheck2d.reports.compare.delays import (
 )
 from crosscheck2d.reports.compare.metrics import METRICS
 from crosscheck2d.scenarios.catalogue import SCENARIOS
-from crosscheck2d.scenarios.model import Array, Scenario, Scene, Trajectory
-from crosscheck2d.scenarios.truth.exact import with_oracle
+from crosscheck2d.scenarios.model import Scenario, Trajectory
 from tests.reports.compare.answers import beside_truth, truth_of
 
 HELD = ("velocity_max", "velocity_rms", "momentum_deviation", "energy_deviation")
 
 
 def values(one: Scenario, dt: float, played: Trajectory, truth: Trajectory) -> list[float]:
-    """Of `HELD`."""
     beside = beside_truth(one, dt, played, truth)
     return [found.value for name in HELD if (found := METRICS[name].of(beside)) is not None]
 
 
 def late(one: Scenario, truth: Trajectory, delay: float) -> Trajectory:
-    """The truth as it was `delay` s ago: without gravity a motion with every collision late by as
-    much."""
-    assert one.truth is not None
     return replace(truth, velocity=one.truth(np.maximum(truth.t - delay, 0.0)).velocity)
 
 
@@ -44,7 +36,6 @@ def late(one: Scenario, truth: Trajectory, delay: float) -> Trajectory:
 )
 @pytest.mark.parametrize("steps", [0.3, 1.0, 2.7])
 def test_to_be_late_by_less_than_three_steps_costs_nothing(name: str, steps: float):
-    """Each disk has another velocity for as long; none that it does not have in the truth."""
     one, truth = truth_of(name)
     dt = one.dt(one.substeps[-1])
 
@@ -56,14 +47,13 @@ def test_to_be_late_by_less_than_three_steps_costs_nothing(name: str, steps: flo
     "name", ["head_on_unequal_e05", "oblique_e09", "box_billiard", "asteroids", "gas_of_100"]
 )
 def test_to_be_late_by_more_than_that_is_seen(name: str):
-    """The control: at four samples of the coarse step a whole collision is missing."""
+    # The control: at four samples of the coarse step a whole collision is missing.
     one, truth = truth_of(name)
 
     assert values(one, one.dt(1), late(one, truth, 4 * one.dt(1)), truth)[0] > 0.1
 
 
 def test_gravity_hides_no_error_of_an_integrator():
-    """Velocities a step old are off by g dt at every sample, also where a collision may be late."""
     one, truth = truth_of("bouncing_ball_e1")
     dt = one.dt(1)
     gravity = np.linalg.norm(one.scene.gravity)
@@ -79,8 +69,6 @@ def test_gravity_hides_no_error_of_an_integrator():
 
 @pytest.mark.parametrize("steps", [0.0, 0.4])
 def test_a_disk_that_is_late_may_keep_falling(steps: float):
-    """Under gravity the flight before the collision is followed on, not held at the velocity it
-    ended with."""
     one, truth = truth_of("bouncing_ball_e1")
     dt = one.dt(1)
     velocity = truth.velocity.copy()
@@ -97,10 +85,7 @@ def test_a_disk_that_is_late_may_keep_falling(steps: float):
 def test_a_sample_at_the_instant_of_a_collision_may_have_the_velocity_before_it_or_after_it(
     name: str,
 ):
-    """Whichever of the two the truth has there, by its rounding; with the control that a third one
-    may not."""
     one, truth = truth_of(name)
-    assert one.truth is not None
     jumps = jumps_of(truth, one)
     collisions = jumps.t[np.diff(jumps.t, prepend=-1) > 1e-6]
     if not len(collisions):
@@ -128,7 +113,6 @@ def test_a_sample_at_the_instant_of_a_collision_may_have_the_velocity_before_it_
     ],
 )
 def test_collisions_take_the_energy_and_the_walls_the_momentum_that_the_truth_loses(name: str):
-    """What the jumps say, added up from the start, is what the truth has less."""
     one, truth = truth_of(name)
     jumps = jumps_of(truth, one)
     past = np.searchsorted(jumps.t, truth.t, side="right")
@@ -146,8 +130,8 @@ def test_collisions_take_the_energy_and_the_walls_the_momentum_that_the_truth_lo
 
 
 def test_of_two_collisions_at_one_instant_either_may_come_first():
-    """A ball in the middle of a row receives an impulse and gives one; mirrored, the list has the
-    two the other way round."""
+    # A ball in the middle of a row receives an impulse and gives one; mirrored, the list has the
+    # two the other way round.
     t, when = np.array([1.0]), np.array([1.0, 1.0])
     receive, give = np.array([1.0, 0.0]), np.array([-1.0, 0.0])
     still = np.zeros((1, 1, 2))
@@ -166,8 +150,6 @@ def test_of_two_collisions_at_one_instant_either_may_come_first():
 
 
 def test_the_distance_to_a_range_of_sums_is_that_to_a_parallelogram():
-    """Inside it nothing; beside it the distance to its nearest edge or corner, whichever way it is
-    turned."""
     rng = np.random.default_rng(1)
     for _ in range(200):
         turn = rng.uniform(0, 2 * np.pi)
@@ -185,80 +167,9 @@ def test_the_distance_to_a_range_of_sums_is_that_to_a_parallelogram():
 
 
 def test_a_point_within_a_range_of_many_impulses_has_no_distance():
-    """Walls that stand at any angle to each other."""
     rng = np.random.default_rng(2)
     for _ in range(50):
         parts = rng.normal(size=(20, 2))
         # The shares are found one after the other, in at most `SWEEPS` rounds: to 1e-6 of the
         # impulses at hand.
         assert distance_to_range(rng.uniform(size=20) @ parts, parts) < 1e-6
-
-
-def box(pace: float) -> Scenario:
-    """Eight disks in a box, `pace` times as fast and as short."""
-    velocity: Array = np.array(
-        [
-            [2.35, 0.51],
-            [-0.17, 1.64],
-            [-2.82, 1.24],
-            [-0.75, -2.45],
-            [0.96, 2.59],
-            [-1.76, 0.78],
-            [-1.21, 1.45],
-            [1.33, -1.69],
-        ]
-    )
-    scene = Scene(
-        position=[
-            [-1.5, 1.7],
-            [-2.2, -0.4],
-            [-1.9, 1.1],
-            [-0.6, 0.1],
-            [0.5, 1.3],
-            [-1.1, 0.5],
-            [-1.1, -2.7],
-            [-1.1, -1.0],
-        ],
-        velocity=pace * velocity,
-        radius=[0.17, 0.27, 0.25, 0.17, 0.24, 0.3, 0.29, 0.34],
-        mass=[2.6, 2.1, 2.2, 2.6, 1.6, 2.4, 2.7, 0.8],
-        restitution=0.9,
-        walls=[[[-3, -3], [3, -3]], [[3, -3], [3, 3]], [[3, 3], [-3, 3]], [[-3, 3], [-3, -3]]],
-    )
-    return with_oracle(Scenario("box", "?", "", scene, 1.0 / pace, 0.02 / pace, (1, 2)))
-
-
-def largest_change(metric: str) -> float:
-    """How much a metric, of four engines against the truth and each other, changes if all is ten
-    times as fast."""
-    names = ("reference:exercise", "reference:lesson", "pymunk:matched", "event_driven:float64")
-    found = []
-    for pace in (1, 10):
-        one = box(pace)
-        runs = [
-            play(ENGINES[name].make(), name, one, one.dt(k)) for name in names for k in one.substeps
-        ]
-        table = compare(one, runs).table
-        found.append(
-            table[table.metric == metric].value.to_numpy() / (pace if "velocity" in metric else 1)
-        )
-    assert len(found[0]) > 8
-    return float(np.abs(found[0] - found[1]).max())
-
-
-@pytest.mark.parametrize("metric", HELD)
-def test_the_same_scene_ten_times_as_fast_reads_the_same(metric: str):
-    """Samples, steps and the collisions that are reported of them lie on one grid: no rounding of
-    it decides."""
-    # Rounding of the speeds, 3 m/s, that a few collisions have spread; momenta and energies are
-    # relative.
-    assert largest_change(metric) < 1e-9
-
-
-def test_a_threshold_on_the_grid_is_seen(monkeypatch: pytest.MonkeyPatch):
-    """The control: with a window of three steps the rounding of the grid decides which samples are
-    compared."""
-    for module in (delays, view):
-        monkeypatch.setattr(module, "WINDOW", 3.0)
-
-    assert largest_change("momentum_deviation") > 1e-6

@@ -5,12 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from crosscheck2d.adapters.engines import ENGINES
-from crosscheck2d.adapters.play import play_once
 from crosscheck2d.reports.compare.comparison import Comparison, compare
 from crosscheck2d.reports.compare.fast_disks import fast_note, plain, rounded_down
 from crosscheck2d.scenarios.model import Scenario, Scene
 from crosscheck2d.scenarios.truth.exact import with_oracle
+from tests.reports.compare.answers import run_engine, run_engines
 
 INTERVAL = 0.1  # s
 PHASES = np.linspace(0.0, 1.0, 41)  # of a step, at which the disk would touch
@@ -35,30 +34,18 @@ def shot(ratio: float, phase: float = 0.5, wall: bool = False) -> Scenario:
 
 
 def played(scenario: Scenario, *engines: str) -> Comparison:
-    """By these engines at every step size."""
-    return compare(
-        scenario,
-        [
-            play_once(ENGINES[name].make, name, scenario, scenario.dt(substeps))
-            for name in engines
-            for substeps in scenario.substeps
-        ],
-    )
+    return compare(scenario, run_engines(scenario, *engines))
 
 
 def passes_through(scenario: Scenario) -> bool:
     """Whether the disk is beyond the other, or the wall, at the end, in `reference:exercise` at the
     coarsest step."""
-    name = "reference:exercise"
-    run = play_once(ENGINES[name].make, name, scenario, INTERVAL)
-    assert run.trajectory is not None
-    x = run.trajectory.position[-1, :, 0]
+    x = run_engine(scenario, "reference:exercise").trajectory.position[-1, :, 0]
     return bool(x[0] > (x[1] if len(x) > 1 else 0.0))
 
 
 @pytest.mark.parametrize("wall", [False, True])
 def test_it_is_said_where_a_solver_passes_through_and_not_where_it_never_does(wall: bool):
-    """Of the exercise's solver, at 41 phases of the step."""
     for ratio in (0.5, 0.98, 1.02, 1.5, 5.0):
         missed = any(passes_through(shot(ratio, phase, wall)) for phase in PHASES)
         note = fast_note(played(shot(ratio, wall=wall), "reference:exercise"))
@@ -66,14 +53,13 @@ def test_it_is_said_where_a_solver_passes_through_and_not_where_it_never_does(wa
 
 
 def test_the_step_that_is_called_safe_is():
-    """Of 5 times the distance of touching in 0.1 s, 0.02 s are one: less is said."""
     scenario = shot(5.0)
 
     assert "With steps of 0.02 s it cannot." in fast_note(played(scenario, "reference:exercise"))
 
 
 def test_a_cap_that_rounding_makes_smaller_is_not_named():
-    """20 m/s in a step of 0.1 s, which float32 makes a little less, are what the disk has."""
+    # 20 m/s in a step of 0.1 s, which float32 makes a little less, are what the disk has.
     assert "allow less" not in fast_note(played(shot(10.0), "reference:exercise", "box2d:shipped"))
 
 
@@ -81,12 +67,11 @@ def test_a_cap_that_rounding_makes_smaller_is_not_named():
     ("value", "says"), [(12000.0, "12000"), (1e-6, "0.000001"), (100.0, "100")]
 )
 def test_numbers_in_the_sentence_have_no_exponent(value: float, says: str):
-    """1e+02 beside 10⁻⁶ would be two formats on one page."""
     assert plain(value) == says
 
 
 def test_the_caps_below_the_fastest_disk_are_named():
-    """Box2D 2.3 moves nothing by more than 2 units in a step, which here are 20 m/s."""
+    # Box2D 2.3 moves nothing by more than 2 units in a step, which here are 20 m/s.
     fast, slow = shot(50.0), shot(9.5)  # 100 and 19 m/s
 
     assert fast_note(played(fast, "reference:exercise", "box2d:shipped")).endswith(
@@ -97,7 +82,6 @@ def test_the_caps_below_the_fastest_disk_are_named():
 
 
 def test_without_an_exact_answer_the_speeds_are_those_that_engines_reach():
-    """A disk that is slow at its start and falls past another at up to 60 m/s."""
     scene = replace(shot(0.1).scene, gravity=np.array([0.0, -100.0]))
     falling = replace(shot(0.1), scene=scene, truth=None, without_truth="not asked for here")
 
@@ -109,5 +93,4 @@ def test_without_an_exact_answer_the_speeds_are_those_that_engines_reach():
     ("value", "down"), [(0.0123, 0.01), (0.0099, 0.009), (2.0, 2.0), (37.0, 30.0)]
 )
 def test_a_safe_step_is_rounded_down(value: float, down: float):
-    """To one digit."""
     assert rounded_down(value) == pytest.approx(down)

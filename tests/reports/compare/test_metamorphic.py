@@ -15,12 +15,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from crosscheck2d.adapters.engines import ENGINES
-from crosscheck2d.adapters.play import play
 from crosscheck2d.adapters.run import Run
-from crosscheck2d.reports.compare import collisions, delays, faces, view
+from crosscheck2d.reports.compare import collisions, delays, laws, view
 from crosscheck2d.reports.compare.comparison import compare
-from crosscheck2d.reports.compare.metrics import METRICS, Metric, _largest_of_disks
+from crosscheck2d.reports.compare.metrics import METRICS, Metric
 from crosscheck2d.reports.compare.scales import momentum
 from crosscheck2d.reports.compare.verdicts import VERDICTS
 from crosscheck2d.reports.compare.view import Value, View
@@ -28,6 +26,7 @@ from crosscheck2d.scenarios.families.placing import box, lay_out
 from crosscheck2d.scenarios.files.scene_file import read_scene_file
 from crosscheck2d.scenarios.model import Scenario, Scene, Thrust
 from crosscheck2d.scenarios.truth.exact import with_oracle
+from tests.reports.compare.answers import run_engines
 from tests.reports.compare.metamorphic import CHANGES, Change
 
 PLAYED = (
@@ -43,12 +42,10 @@ ROOM = box([-2.5, -2.5], [2.5, 2.5])
 def asked(
     name: str, scene: Scene, duration: float, interval: float, thrusts: tuple[Thrust, ...] = ()
 ) -> Scenario:
-    """The scene at two steps, with the oracle for its answer."""
     return with_oracle(Scenario(name, "?", "", scene, duration, interval, (1, 2), thrusts))
 
 
 def crowd(**more: object) -> Scene:
-    """Five disks of five sizes that meet soon."""
     return lay_out(
         position=[[-1.5, 1.7], [-2.2, -0.4], [-0.6, 0.1], [0.5, 1.3], [1.2, -1.1]],
         velocity=[[2.35, -1.51], [1.17, 0.64], [-0.75, -2.45], [-0.96, -2.59], [-1.76, 1.78]],
@@ -142,15 +139,12 @@ changes of velocity."""
 
 @cache
 def played(name: str) -> tuple[Scenario, tuple[Run, ...], pd.DataFrame]:
-    """A scene, every run of it that came to its end, and their table."""
     one = SCENES[name]()
-    every = [play(ENGINES[who].make(), who, one, one.dt(k)) for who in PLAYED for k in one.substeps]
-    runs = tuple(run for run in every if run.status == "ok")
+    runs = tuple(run for run in run_engines(one, *PLAYED) if run.status == "ok")
     return one, runs, compare(one, runs).table
 
 
 def wrong(name: str, change: Change) -> list[str]:
-    """The rows that do not change as their unit says."""
     one, runs, before = played(name)
     new = change.scenario(one)
     after = compare(new, [change.run(run, one) for run in runs]).table
@@ -185,12 +179,10 @@ PAIRS = [
 
 @pytest.mark.parametrize(("name", "change"), PAIRS)
 def test_every_metric_changes_as_its_unit_says(name: str, change: str):
-    """Against the laws, the exact answer and every other engine, at two steps."""
     assert not wrong(name, CHANGES[change])
 
 
 def test_every_metric_is_under_test():
-    """Each has a number in some of these scenes, that is not zero."""
     tables = [played(name)[2] for name in SCENES]
     assert {*pd.concat(tables).metric} - {*VERDICTS} == {*METRICS}
     for metric in METRICS:
@@ -210,133 +202,87 @@ def test_every_metric_is_under_test():
 def test_any_units_and_any_axes_will_do(
     length: float, time: float, mass: float, turn: float, flip: int, name: str
 ):
-    """All at once."""
     assert not wrong(name, Change(length=length, time=time, mass=mass, turn=turn, flip=flip))
 
 
-def three_steps_away(view: View) -> Value:
-    """How many samples are further than 3 dt from each collision: a threshold on the grid."""
+def three_steps_away(view: View) -> int:
     near = np.abs(view.played.t[:, None] - view.played.collisions.t).min(axis=1, initial=np.inf)
-    return Value(float((near > 3 * view.dt).sum()))
+    return (near > 3 * view.dt).sum()
 
 
-def by_a_millimetre(view: View) -> Value:
-    """How many disks are off by more than 1 mm in some sample."""
-    return Value(float((view.deviation > 1e-3).any(axis=0).sum()))
+def offset(view: View) -> np.ndarray:
+    return view.played.position - view.other.position
 
 
-def of_the_first_disk(view: View) -> Value:
-    """How far the first disk is off."""
-    return _largest_of_disks(view.deviation[:, :1], view)
-
-
-def along_x(view: View) -> Value:
-    """How far a disk is off along x."""
-    assert view.other is not None
-    return Value(float(np.abs(view.played.position[..., 0] - view.other.position[..., 0]).max()))
-
-
-def to_the_right(view: View) -> Value:
-    """How far a disk is off to the top, at most."""
-    assert view.other is not None
-    return Value(float((view.played.position[..., 1] - view.other.position[..., 1]).max()))
-
-
-def from_the_origin(view: View) -> Value:
-    """How far away a disk is, at most."""
-    return Value(float(np.hypot(*np.moveaxis(view.played.position, -1, 0)).max()))
-
-
-def per_second(view: View) -> Value:
-    """How many collisions there are in a second."""
-    return Value(len(view.played.collisions) / float(view.played.t[-1]))
-
-
-def of_walls(view: View) -> Value:
-    """How many walls there are."""
-    return Value(float(len(view.scenario.scene.walls)))
-
-
-def heavy(view: View) -> Value:
-    """How many disks are of more than 2 kg."""
-    return Value(float((view.scenario.scene.mass > 2).sum()))
-
-
-def largest(view: View) -> Value:
-    """The largest radius."""
-    return Value(float(view.scenario.scene.radius.max()))
-
-
-def of_thrusts(view: View) -> Value:
-    """How many thrusts there are."""
-    return Value(float(len(view.scenario.thrusts)))
-
-
-def fastest(view: View) -> Value:
-    """Of any disk, at any time."""
-    return Value(float(np.abs(view.played.velocity).max()))
-
-
+# What should not be a metric: its unit, and the number.
+WRONG_METRICS: dict[str, tuple[str, Callable[[View], float]]] = {
+    "samples further than 3 dt from each collision": ("1", three_steps_away),
+    "disks off by more than 1 mm": (
+        "disks",
+        lambda view: (view.deviation > 1e-3).any(axis=0).sum(),
+    ),
+    "first disk off": ("m", lambda view: view.deviation[:, 0].max()),
+    "off along x": ("m", lambda view: np.abs(offset(view)[..., 0]).max()),
+    "off to the top": ("m", lambda view: offset(view)[..., 1].max()),
+    "distance from the origin": ("m", lambda view: laws.lengths(view.played.position).max()),
+    "collisions per second": ("1", lambda view: len(view.played.collisions) / view.played.t[-1]),
+    "walls": ("1", lambda view: len(view.scene.walls)),
+    "disks of more than 2 kg": ("1", lambda view: (view.scene.mass > 2).sum()),
+    "largest radius": ("1", lambda view: view.scene.radius.max()),
+    "thrusts": ("1", lambda view: len(view.scenario.thrusts)),
+    "fastest": ("m/s", lambda view: np.abs(view.played.velocity).max()),
+}
 WRONG = [
-    (three_steps_away, "1", "grid", "ten times as fast"),
-    (by_a_millimetre, "disks", "room", "in km"),
-    (of_the_first_disk, "m", "room", "permuted"),
-    (of_the_first_disk, "m", "room", "rolled"),
-    (along_x, "m", "room", "turned"),
-    (to_the_right, "m", "room", "mirrored"),
-    (to_the_right, "m", "room", "turned by a quarter and mirrored"),
-    (from_the_origin, "m", "room", "shifted"),
-    (per_second, "1", "room", "a third as fast"),
-    (per_second, "1", "room", "in ms"),
-    (per_second, "1", "room", "in feet, minutes and pounds"),
-    (of_walls, "1", "room", "walls cut in two"),
-    (per_second, "1", "room", "walls doubled"),
-    (heavy, "1", "room", "in g"),
-    (largest, "1", "room", "in mm"),
-    (of_thrusts, "1", "thrust", "thrusts cut in two"),
-    (of_thrusts, "1", "thrust", "thrusts shared by two"),
-    (fastest, "m/s", "free", "boosted"),
+    ("samples further than 3 dt from each collision", "grid", "ten times as fast"),
+    ("disks off by more than 1 mm", "room", "in km"),
+    ("first disk off", "room", "permuted"),
+    ("first disk off", "room", "rolled"),
+    ("off along x", "room", "turned"),
+    ("off to the top", "room", "mirrored"),
+    ("off to the top", "room", "turned by a quarter and mirrored"),
+    ("distance from the origin", "room", "shifted"),
+    ("collisions per second", "room", "a third as fast"),
+    ("collisions per second", "room", "in ms"),
+    ("collisions per second", "room", "in feet, minutes and pounds"),
+    ("walls", "room", "walls cut in two"),
+    ("collisions per second", "room", "walls doubled"),
+    ("disks of more than 2 kg", "room", "in g"),
+    ("largest radius", "room", "in mm"),
+    ("thrusts", "thrust", "thrusts cut in two"),
+    ("thrusts", "thrust", "thrusts shared by two"),
+    ("fastest", "free", "boosted"),
 ]
 
 
-@pytest.mark.parametrize(
-    ("of", "unit", "name", "change"), WRONG, ids=lambda part: getattr(part, "__name__", str(part))
-)
+@pytest.mark.parametrize(("metric", "name", "change"), WRONG)
 def test_a_metric_that_should_not_be_one_is_caught(
-    of: Callable[[View], Value], unit: str, name: str, change: str, monkeypatch: pytest.MonkeyPatch
+    metric: str, name: str, change: str, monkeypatch: pytest.MonkeyPatch
 ):
-    """The control, one for each change: it is there to catch something."""
-    monkeypatch.setitem(METRICS, "wrong", Metric(of, unit, ("truth",)))
-    played.cache_clear()
-    try:
-        found = wrong(name, CHANGES[change])
-    finally:
-        played.cache_clear()
-    assert found
-    assert [row for row in found if not row.startswith("wrong ")] == []
+    unit, number = WRONG_METRICS[metric]
+    wrong_metric = Metric(lambda view: Value(float(number(view))), unit, ("truth",))
+    monkeypatch.setitem(METRICS, "wrong", wrong_metric)
+    rows = wrong_again(name, change)
+    assert rows
+    assert [row for row in rows if not row.startswith("wrong ")] == []
 
 
 def test_there_is_a_control_for_every_change():
-    """Else a change might change nothing."""
     assert {change for *_, change in WRONG} == {*CHANGES}
 
 
 def test_a_bound_on_the_grid_is_caught_in_the_metrics_themselves(monkeypatch: pytest.MonkeyPatch):
-    """With windows of three steps, or times compared without their rounding, the last bit
-    decides."""
     # what is compiled keeps its bounds
     monkeypatch.setattr(collisions, "judge", collisions.judge.py_func)
     for module in (delays, view, collisions):
         monkeypatch.setattr(module, "WINDOW", 3.0)
     assert wrong_again("room", "ten times as fast")
     monkeypatch.undo()
-    for module in (delays, collisions, faces):
+    for module in (delays, collisions):
         monkeypatch.setattr(module, "SAME", 0.0)
     assert wrong_again("grid", "in ms")
 
 
 def wrong_again(name: str, change: str) -> list[str]:
-    """The rows, with all worked out anew."""
     played.cache_clear()
     try:
         return wrong(name, CHANGES[change])
@@ -348,25 +294,13 @@ CASES = Path(__file__).parents[3] / "tests" / "data" / "scenes"
 
 
 def test_a_scene_ten_times_as_fast_gives_the_same_numbers_in_its_own_file():
-    """Two files that are one scene, played each: here engines are asked as well.
-
-    Those without a unit of time: pymunk takes as much of an overlap away in a second, whatever a
-    second is.
-    """
+    # Two files that are one scene, played each: here engines are asked as well. Those without a
+    # unit of time: pymunk takes as much of an overlap away in a second, whatever a second is.
     tables = []
     for name in ("pace_1", "pace_10"):
         one = read_scene_file(CASES / f"{name}.toml")
-        runs = [
-            play(ENGINES[who].make(), who, one, one.dt(k))
-            for who in (
-                "reference:exercise",
-                "reference:lesson",
-                "reference:ordered",
-                "event_driven:float64",
-            )
-            for k in one.substeps
-        ]
-        tables.append(compare(one, runs).table)
+        solvers = ("reference:exercise", "reference:lesson", "reference:ordered")
+        tables.append(compare(one, run_engines(one, *solvers, "event_driven:float64")).table)
     slow, fast = tables
     assert slow.metric.tolist() == fast.metric.tolist()
     factor = slow.unit.map({"m/s": 10.0, "rad/s": 10.0, "s": 0.1}).fillna(1.0)

@@ -1,16 +1,18 @@
 """The judge judged: metrics of trajectories whose faults were put in by hand."""
 
+import gc
+import weakref
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.adapters.play import play
 from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.compare import laws
 from crosscheck2d.reports.compare.comparison import compare
 from crosscheck2d.reports.compare.delays import jumps_of
+from crosscheck2d.reports.compare.laws import cached
 from crosscheck2d.reports.compare.metrics import METRICS
 from crosscheck2d.reports.compare.table import COLUMNS
 from crosscheck2d.reports.compare.view import NOT_JUDGED, View, cut
@@ -20,25 +22,17 @@ from crosscheck2d.scenarios.catalogue import SCENARIOS, scenario
 from crosscheck2d.scenarios.model import Scenario, Scene, Thrust, Trajectory
 from crosscheck2d.scenarios.truth.exact import with_oracle
 from tests.adapters.broken_engines import NanAtStep7
-from tests.reports.compare.answers import beside_truth, truth_of
+from tests.reports.compare.answers import beside_truth, one_disk, run_alone, run_engine, truth_of
 
 WITH_TRUTH = [name for name in SCENARIOS if scenario(name).truth]
 
 
 def value(metric: str, view: View) -> float:
-    """The value of a metric that applies."""
-    found = METRICS[metric].of(view)
-    assert found is not None
-    return found.value
+    return METRICS[metric].of(view).value
 
 
 @pytest.mark.parametrize("name", WITH_TRUTH)
 def test_the_truth_against_itself_is_zero(name: str):
-    """Every error of the truth measured against the truth is 0, it never leaves the 1 % band, it
-    misses no collision.
-
-    What is not judged at this step is no number (test_judged_collisions.py).
-    """
     one, truth = truth_of(name)
     view = beside_truth(one, one.dt(1), truth, truth)
 
@@ -51,8 +45,6 @@ def test_the_truth_against_itself_is_zero(name: str):
 
 @pytest.mark.parametrize("name", WITH_TRUTH)
 def test_the_truth_keeps_the_laws(name: str):
-    """Momentum, energy and non-penetration hold in the truth to the rounding of a sum over its
-    disks."""
     one, truth = truth_of(name)
     view = View(one, one.dt(1), truth)
 
@@ -71,8 +63,6 @@ def test_the_truth_keeps_the_laws(name: str):
 
 @pytest.mark.parametrize("name", ["head_on_equal_e09", "line_gas", "ping_pong"])
 def test_a_disk_moved_by_a_millimetre_reads_a_millimetre(name: str):
-    """One sample of one disk moved by 1 mm: the largest deviation is 1 mm, at that disk and that
-    instant."""
     one, truth = truth_of(name)
     position = truth.position.copy()
     k, disk = len(truth) // 2, one.scene.n - 1
@@ -81,14 +71,12 @@ def test_a_disk_moved_by_a_millimetre_reads_a_millimetre(name: str):
         View(one, one.dt(1), replace(truth, position=position), truth)
     )
 
-    assert found is not None
     # the rounding of x + 0.0008 at |x| < 20, over 1e-3
     assert found.value == pytest.approx(1e-3, rel=1e-9)
     assert (found.disk, found.at) == (disk, truth.t[k])
 
 
 def test_momentum_that_leaks_is_seen():
-    """A velocity off by 1 % on one of two equal disks is a momentum error of half a percent."""
     one, truth = truth_of("head_on_equal_e1")
     velocity = truth.velocity.copy()
     velocity[-1, 0] *= 1.01
@@ -99,7 +87,6 @@ def test_momentum_that_leaks_is_seen():
 
 
 def test_energy_that_is_created_is_seen():
-    """A speed that rises by 1 % raises the energy by 2 % of that disk's share."""
     one, truth = truth_of("box_billiard")
     spin = (truth.angular_velocity[0] ** 2 @ one.scene.inertia) / 2
     velocity = truth.velocity.copy()
@@ -112,46 +99,26 @@ def test_energy_that_is_created_is_seen():
 
 
 def test_weight_and_thrust_are_accounted_for():
-    """Free flight under gravity and a world-frame thrust has no momentum error."""
-    scene = Scene(
-        position=[[0, 0]],
-        velocity=[[1, 2]],
-        radius=[0.1],
-        mass=[2],
-        restitution=1,
-        gravity=[0, -9.81],
-    )
-    one = Scenario(
-        name="thrust",
-        asks="?",
-        source="",
-        scene=scene,
-        duration=1.0,
-        sample_interval=0.1,
-        thrusts=[Thrust(0, 0.25, 0.6, [3.0, 1.0])],
-    )
-    run = play(ENGINES["reference:exercise"].make(), "reference:exercise", one, one.dt(1))
-    assert run.trajectory is not None
+    scene = one_disk([0, 0], [1, 2], mass=[2], gravity=[0, -9.81])
+    thrusts = [Thrust(0, 0.25, 0.6, [3.0, 1.0])]
+    one = Scenario("thrust", "?", "", scene, 1.0, 0.1, thrusts=thrusts)
 
     # ten additions of float64
-    assert value("momentum_error", View(one, run.dt, run.trajectory)) < 1e-14
+    assert value("momentum_error", run_alone(one, "reference:exercise")) < 1e-14
 
 
 def test_deviation_is_measured_across_the_seam():
-    """Where the scene wraps, two disks on both sides of the same edge are close."""
     one = scenario("asteroids")
-    run = play(ENGINES["reference:exercise"].make(), "reference:exercise", one, one.dt(4))
-    assert run.trajectory is not None
+    played = run_alone(one, "reference:exercise", 4).played
     # the box is 10 m wide
-    moved = replace(run.trajectory, position=run.trajectory.position + [10.0, 0.0])
+    moved = replace(played, position=played.position + [10.0, 0.0])
 
     # rounding of x + 10
-    assert value("position_max", View(one, run.dt, moved, run.trajectory)) < 1e-14
+    assert value("position_max", View(one, one.dt(4), moved, played)) < 1e-14
 
 
 @pytest.mark.parametrize("e", ["e0", "e05", "e09", "e1"])
 def test_restitution_is_read_off_the_velocities(e: str):
-    """The exact answer has the restitution it was made with."""
     one, truth = truth_of(f"oblique_{e}")
 
     # Sampled velocities are exact up to rounding; the quotient amplifies it by v / v_n, below 10
@@ -165,14 +132,11 @@ REFLECTED = [n for n in SCENARIOS if n != "heavy_on_light" and not scenario(n).s
 
 @pytest.mark.parametrize("name", REFLECTED)
 def test_the_reference_has_the_restitution_of_the_scene_in_every_scene(name: str):
-    """Its impulse is exact, so what is read off its samples is e, or the reading is wrong; it knows
-    no friction."""
+    # Its impulse is exact, so what is read off its samples is e, or the reading is wrong; it knows
+    # no friction.
     one = scenario(name)
-    run = play(
-        ENGINES["reference:exercise"].make(), "reference:exercise", one, one.dt(one.substeps[0])
-    )
-    assert run.trajectory is not None
-    found = METRICS["restitution_error"].of(View(one, run.dt, run.trajectory))
+    view = run_alone(one, "reference:exercise", one.substeps[0])
+    found = METRICS["restitution_error"].of(view)
 
     # Rounding of v, twice over the closing speed: once in the normal, once in e. The slowest graze
     # here is 1e-3 v.
@@ -181,8 +145,6 @@ def test_the_reference_has_the_restitution_of_the_scene_in_every_scene(name: str
 
 @pytest.mark.parametrize("metric", METRICS)
 def test_every_metric_is_a_number_or_silent_for_any_trajectory(metric: str):
-    """Also for one that explodes, one that stands still, one sample, and a disk that does not
-    turn."""
     scene = replace(scenario("box_billiard").scene, inertia=np.array([np.inf]))
     one = replace(scenario("box_billiard"), scene=scene)
     assert one.truth is not None
@@ -202,12 +164,9 @@ def test_every_metric_is_a_number_or_silent_for_any_trajectory(metric: str):
 
 
 def test_a_run_that_diverged_earns_a_status_and_no_score():
-    """An engine that gives NaN at step 7 was right before it, for a scene that nobody else played
-    so short."""
     one = scenario("slow_collision")
     run = play(NanAtStep7(), "reference:exercise", one, one.dt(1))
-    good = play(ENGINES["pymunk:matched"].make(), "pymunk:matched", one, one.dt(1))
-    table = compare(one, [run, good]).table
+    table = compare(one, [run, run_engine(one, "pymunk:matched")]).table
 
     assert run.trajectory is not None
     assert table[table.engine == "reference"].metric.tolist() == ["status"]
@@ -216,11 +175,9 @@ def test_a_run_that_diverged_earns_a_status_and_no_score():
 
 
 def test_to_refuse_a_scene_does_not_help_in_the_ranking():
-    """Who has no result in a scene is last in it, and who has none in half of them is not ranked
-    first."""
     one, two = scenario("slow_collision"), scenario("near_miss")
     runs = {
-        name: [play(ENGINES[name].make(), name, each, each.dt(4)) for each in (one, two)]
+        name: [run_engine(scene, name, 4) for scene in (one, two)]
         for name in ("reference:exercise", "box2d:shipped")
     }
     refused = Run("pymunk", "matched", one.name, one.dt(4), "unsupported", "too hard")
@@ -237,7 +194,6 @@ def test_to_refuse_a_scene_does_not_help_in_the_ranking():
 
 
 def test_a_disk_that_leaves_its_box_has_gone_through_a_wall():
-    """The centre crosses the segment; a disk that stays inside has not."""
     one, truth = truth_of("box_billiard")
     away = replace(truth, position=truth.position + np.linspace(0, 50, len(truth))[:, None, None])
 
@@ -260,16 +216,8 @@ def test_a_disk_that_leaves_its_box_has_gone_through_a_wall():
 def test_a_sample_on_the_wall_itself_hides_no_crossing_and_makes_none(
     heights: list[float], through: bool, x: float
 ):
-    """A wall in two pieces: rounding decides on which side such a sample is, and of which piece."""
     wall = [[[-1.0, 0.0], [1.0, 0.0]], [[1.0, 0.0], [3.0, 0.0]]]
-    scene = Scene(
-        position=[[x, heights[0]]],
-        velocity=[[0.0, 0.0]],
-        radius=[0.1],
-        mass=[1.0],
-        walls=wall,
-        restitution=1.0,
-    )
+    scene = one_disk([x, heights[0]], walls=wall)
     position = np.array([[[x, height]] for height in heights])
     still = np.zeros((len(heights), 1))
     moved = Trajectory(np.arange(len(heights)), position, 0 * position, still, still)
@@ -278,7 +226,6 @@ def test_a_sample_on_the_wall_itself_hides_no_crossing_and_makes_none(
 
 
 def test_an_explosion_does_not_make_itself_small():
-    """Speeds a thousand times too high are an energy error of a million, not of one."""
     one, truth = truth_of("line_gas")
     velocity = truth.velocity.copy()
     velocity[len(truth) // 2 :] *= 1000
@@ -287,27 +234,15 @@ def test_an_explosion_does_not_make_itself_small():
 
 
 def test_falling_through_a_wrap_is_no_energy_error():
-    """A disk that is set from the bottom to the top has more height; that is the scene's doing."""
-    scene = Scene(
-        position=[[0, 0]],
-        velocity=[[0, 0]],
-        radius=[0.1],
-        mass=[1],
-        restitution=1,
-        gravity=[0, -1],
-        wrap=[[-1, -1], [1, 1]],
-    )
-    one = Scenario(name="rain", asks="?", source="", scene=scene, duration=5.0, sample_interval=0.1)
-    run = play(ENGINES["reference:exercise"].make(), "reference:exercise", one, one.dt(1))
-    assert run.trajectory is not None
-    view = View(one, run.dt, run.trajectory)
+    scene = one_disk([0, 0], gravity=[0, -1], wrap=[[-1, -1], [1, 1]])
+    one = Scenario("rain", "?", "", scene, 5.0, 0.1)
+    view = run_alone(one, "reference:exercise")
 
     assert METRICS["energy_error"].of(view) is None
     assert METRICS["energy_created"].of(view) is None
 
 
 def test_comparison_stops_where_the_other_ends():
-    """Samples and collisions beyond the truth's horizon are cut off."""
     _, truth = truth_of("line_gas")
     short = cut(truth, 100)
 
@@ -317,11 +252,9 @@ def test_comparison_stops_where_the_other_ends():
 
 
 def test_the_table_has_failures_too_and_every_pair_once():
-    """A refused run is a row with its reason; engines are compared pairwise at the same dt, in one
-    direction."""
     one = scenario("head_on_equal_e1")
     names = ["reference:exercise", "reference:lesson", "pymunk:matched"]
-    runs = [play(ENGINES[name].make(), name, one, one.dt(k)) for name in names for k in (1, 2)]
+    runs = [run_engine(one, name, k) for name in names for k in (1, 2)]
     refused = Run(
         "box2d",
         "matched",
@@ -341,19 +274,14 @@ def test_the_table_has_failures_too_and_every_pair_once():
 
 
 def test_without_a_truth_nothing_is_called_an_error_of_position():
-    """Where nobody knows the answer the table has laws and pairs only."""
     one = replace(scenario("gas_of_100"), duration=0.5, truth=None)
-    runs = [
-        play(ENGINES[name].make(), name, one, one.dt(4))
-        for name in ("reference:exercise", "pymunk:matched")
-    ]
+    runs = [run_engine(one, name, 4) for name in ("reference:exercise", "pymunk:matched")]
     table = compare(one, runs).table
 
     assert set(table.versus) == {"itself", "pymunk:matched"}
 
 
 def test_where_the_oracle_refuses_the_comparison_says_why():
-    """Disks that overlap have no exact answer: no error is claimed, and the reason is at hand."""
     scene = Scene(
         position=[[0, 0], [0.3, 0]],
         velocity=[[0, 0], [0, 0]],
@@ -365,3 +293,39 @@ def test_where_the_oracle_refuses_the_comparison_says_why():
 
     assert refused.truth is None
     assert "disk 0 and disk 1 overlap by 0.1 m" in refused.scenario.without_truth
+
+
+# The cache of the laws.
+
+
+def test_a_law_is_computed_once_for_the_same_objects_and_again_for_a_copy():
+    computed = []
+    law = cached(lambda one, other: computed.append((one, other)) or one.position + other.position)
+    one, other = (scenario(name).scene for name in ("near_miss", "oblique_e1"))
+    again = replace(other)
+
+    found = law(one, other)
+    assert law(one, other) is found
+    assert law(one, again) is not found
+    assert computed == [(one, other), (one, again)]
+
+
+def test_what_was_found_cannot_be_edited():
+    found = cached(lambda scene: scene.position * 2)(scenario("near_miss").scene)
+
+    with pytest.raises(ValueError, match="read-only"):
+        found[0] = 0.0
+
+
+def test_what_was_found_is_forgotten_with_the_first_object():
+    law = cached(lambda one, other: one.position + other.position)
+    one, other = (scenario(name).scene for name in ("near_miss", "oblique_e1"))
+    law(one, other)
+    kept = weakref.ref(other)
+
+    del other
+    gc.collect()
+    assert kept() is not None
+    del one
+    gc.collect()
+    assert kept() is None

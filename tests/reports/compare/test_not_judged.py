@@ -9,22 +9,20 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from crosscheck2d.adapters.engines import ENGINES
-from crosscheck2d.adapters.play import play
 from crosscheck2d.adapters.run import Run
-from crosscheck2d.reports.commands.medians import medians
+from crosscheck2d.reports.commands.diff import changed_numbers
+from crosscheck2d.reports.commands.run import medians
+from crosscheck2d.reports.compare.collisions import WINDOW
 from crosscheck2d.reports.compare.comparison import Comparison, compare
-from crosscheck2d.reports.compare.delays import WINDOW
 from crosscheck2d.reports.compare.metrics import METRICS
 from crosscheck2d.reports.compare.view import LEAST_SHARE, NOT_JUDGED, View, cut
 from crosscheck2d.reports.page.findings import findings, nearest
 from crosscheck2d.reports.page.scenes import scenes_of, values
 from crosscheck2d.reports.page.summary import summarize
 from crosscheck2d.reports.run.comparing import read_scene_table
-from crosscheck2d.reports.run.diff import changed_numbers
 from crosscheck2d.scenarios.catalogue import scenario
 from crosscheck2d.scenarios.model import Scenario, Trajectory
-from tests.reports.compare.answers import beside_truth, truth_of
+from tests.reports.compare.answers import beside_truth, run_engine, truth_of
 
 CARRIED = (
     "velocity_max",
@@ -41,7 +39,6 @@ NAMES = ("reference:exercise", "pymunk:matched")
 def known_until(name: str, samples: int) -> Scenario:
     """A scenario whose truth is known at so many samples, the start among them."""
     one = scenario(name)
-    assert one.truth is not None
     truth, until = one.truth, (samples - 0.5) * one.sample_interval
 
     def cut_off(t: np.ndarray) -> Trajectory:
@@ -52,8 +49,7 @@ def known_until(name: str, samples: int) -> Scenario:
 
 
 def compared(one: Scenario, *, substeps: tuple[int, ...] = (1, 2, 4)) -> Comparison:
-    """By two engines."""
-    runs = [play(ENGINES[name].make(), name, one, one.dt(k)) for name in NAMES for k in substeps]
+    runs = [run_engine(one, name, k) for name in NAMES for k in substeps]
     return compare(one, runs)
 
 
@@ -66,7 +62,6 @@ def table_of(name: str, samples: int = 0) -> pd.DataFrame:
 
 
 def against_truth(table: pd.DataFrame, metric: str, dt: float) -> pd.DataFrame:
-    """Its rows at a step size."""
     return table[(table.metric == metric) & (table.versus == "truth") & (table.dt_s == dt)]
 
 
@@ -75,8 +70,6 @@ def against_truth(table: pd.DataFrame, metric: str, dt: float) -> pd.DataFrame:
 )
 @pytest.mark.parametrize("metric", CARRIED)
 def test_a_crowded_scene_is_judged_at_every_step_size(name: str, metric: str):
-    """From nearly all of its samples, and says from how many; a stepping engine has no perfect
-    score."""
     rows = table_of(name).query("metric == @metric and versus == 'truth'")
 
     for row in rows.to_dict("records"):
@@ -88,7 +81,6 @@ def test_a_crowded_scene_is_judged_at_every_step_size(name: str, metric: str):
 
 
 def test_nothing_is_judged_by_the_start_alone():
-    """A truth that is lost before its second sample leaves only what was given to all."""
     rows = compared(known_until("wall_to_wall", 1)).table.query("versus == 'truth'")
 
     assert set(CARRIED) | {"position_max_radii", "collisions_missed"} <= set(rows.metric)
@@ -98,8 +90,8 @@ def test_nothing_is_judged_by_the_start_alone():
 
 @pytest.mark.parametrize("metric", [name for name in CARRIED if name != "energy_loss_error"])
 def test_what_is_carried_by_less_than_the_share_is_not_judged(metric: str):
-    """Within three steps of its end a truth does not say which velocity may come early: of 3
-    samples 2 are left at dt / 4, none at dt."""
+    # Within three steps of its end a truth does not say which velocity may come early: of 3 samples
+    # 2 are left at dt / 4, none at dt.
     one, table = scenario("wall_to_wall"), table_of("wall_to_wall", 4)
     fine, coarse = (against_truth(table, metric, one.dt(k)) for k in (4, 1))
 
@@ -110,12 +102,8 @@ def test_what_is_carried_by_less_than_the_share_is_not_judged(metric: str):
 
 
 def test_beside_an_engine_the_disks_away_from_collisions_are_judged():
-    """Of a pair that collides once, all samples but those within three steps of the collision of
-    either engine."""
     one = scenario("head_on_equal_e05")
-    runs = [play(ENGINES[name].make(), name, one, one.dt(1)).trajectory for name in NAMES]
-    assert runs[0] is not None
-    assert runs[1] is not None
+    runs = [run_engine(one, name).trajectory for name in NAMES]
     view = View(one, one.dt(1), runs[0], runs[1])
     collisions = np.append(runs[0].collisions.t, runs[1].collisions.t)
     near = np.abs(view.played.t[:, None] - collisions).min(axis=1) < WINDOW * one.dt(1)
@@ -128,12 +116,8 @@ def test_beside_an_engine_the_disks_away_from_collisions_are_judged():
 
 
 def test_two_engines_that_are_always_in_contact_are_not_judged_by_their_collisions():
-    """Each reports a collision every other step: less than a tenth of the samples is left."""
     one = scenario("slide_on_incline")
-    found = play(
-        ENGINES["reference:exercise"].make(), "reference:exercise", one, one.dt(1)
-    ).trajectory
-    assert found is not None
+    found = run_engine(one, "reference:exercise").trajectory
     times = np.arange(0.0, one.duration, 2 * one.dt(1))
     collisions = replace(
         found.collisions,
@@ -146,13 +130,11 @@ def test_two_engines_that_are_always_in_contact_are_not_judged_by_their_collisio
     value = METRICS["velocity_max"].of(view)
 
     assert view.share(view.judged) < LEAST_SHARE
-    assert value is not None
     assert np.isnan(value.value)
     assert value.note.startswith(f"{NOT_JUDGED}: only ")
 
 
 def lost(comparison: Comparison, name: str, metric: str) -> Comparison:
-    """The comparison, with a metric of an engine not judged."""
     table = comparison.table.copy()
     engine, profile = name.split(":")
     rows = (table.metric == metric) & (table.engine == engine) & (table.profile == profile)
@@ -162,7 +144,6 @@ def lost(comparison: Comparison, name: str, metric: str) -> Comparison:
 
 
 def test_what_is_not_judged_is_shown_and_counts_in_no_median():
-    """Of two scenes the other one makes the median; where none is left there is none."""
     good = [compared(scenario(name)) for name in ("wall_to_wall", "head_on_equal_e05")]
     half = [good[0], lost(good[1], NAMES[0], "energy_error")]
     none = [lost(one, NAMES[0], "energy_error") for one in good]
@@ -179,7 +160,6 @@ def test_what_is_not_judged_is_shown_and_counts_in_no_median():
 
 
 def test_a_scene_known_at_its_start_only_beats_nobody():
-    """It is left out of the findings, and has no error."""
     nothing = compared(known_until("wall_to_wall", 1))
     known = compared(scenario("head_on_equal_e05"))
 
@@ -190,17 +170,16 @@ def test_a_scene_known_at_its_start_only_beats_nobody():
 
 
 def test_a_number_that_is_judged_in_one_run_only_is_neither_worse_nor_better(tmp_path: Path):
-    """Beside the control: the same with a number is worse."""
     whole = compared(scenario("wall_to_wall"))
     tables = []
     for each in (whole, lost(whole, NAMES[0], "velocity_rms")):
         each.table.to_csv(tmp_path / "share.csv", index=False)
         read_scene_table((tmp_path / "share.csv").read_bytes())
         tables.append(pd.read_csv(tmp_path / "share.csv", dtype=str, keep_default_na=False))
-    changes, _ = changed_numbers(*tables, set(), set())
-    back, _ = changed_numbers(*tables[::-1], set(), set())
+    changes, _ = changed_numbers(*tables, set())
+    back, _ = changed_numbers(*tables[::-1], set())
     tables[1].loc[tables[1].note.str.startswith(NOT_JUDGED), ["value", "note"]] = "1e9", ""
-    control, _ = changed_numbers(*tables, set(), set())
+    control, _ = changed_numbers(*tables, set())
 
     assert {change.verdict for change in (*changes, *back)} == {"other"}
     assert {change.after for change in changes} == {NOT_JUDGED}
@@ -208,20 +187,16 @@ def test_a_number_that_is_judged_in_one_run_only_is_neither_worse_nor_better(tmp
 
 
 def test_a_velocity_that_overflows_is_judged_and_bad():
-    """Too large for a float is not the same as not judged."""
     one, truth = truth_of("wall_to_wall")
     huge = replace(truth, velocity=truth.velocity * 1e200)
     with np.errstate(over="ignore", invalid="ignore"):
         found = METRICS["energy_deviation"].of(beside_truth(one, one.dt(1), huge, truth))
 
-    assert found is not None
     assert not np.isfinite(found.value)
     assert NOT_JUDGED not in found.note
 
 
 def test_a_number_of_the_table_is_nan_only_where_it_is_not_judged():
-    """An overflow is infinitely far off, so that no reader takes it for a number that is left
-    out."""
     one, truth = truth_of("wall_to_wall")
     huge = replace(truth, velocity=truth.velocity * 1e200)
     run = Run("pymunk", "matched", one.name, one.dt(1), trajectory=huge)
@@ -233,19 +208,7 @@ def test_a_number_of_the_table_is_nan_only_where_it_is_not_judged():
     assert (table.value.isna() == unjudged).all()
 
 
-def test_a_failed_run_is_no_number_that_is_not_judged():
-    """Its row is a status."""
-    one = scenario("wall_to_wall")
-    table = compare(
-        one, [Run("pymunk", "matched", one.name, one.dt(1), "unsupported", "too hard")]
-    ).table
-
-    assert table.metric.tolist() == ["status"]
-    assert not table.note.str.startswith(NOT_JUDGED).any()
-
-
 def test_where_nobody_was_played_it_is_not_said_that_there_is_no_answer():
-    """The only engine broke the protocol: there is an exact answer, and nobody to be held to it."""
     comparisons = [compared(known_until("slow_collision", 50))]
     alone, without = nearest(summarize(comparisons, NAMES)), nearest(summarize([]))
 

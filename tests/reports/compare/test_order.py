@@ -53,7 +53,6 @@ def measured(order: int, **how: float):
 
 @pytest.mark.parametrize("order", [1, 2])
 def test_a_method_of_known_order_gives_its_order(order: int):
-    """Error dt^p: the slope is p, with an interval as narrow as rounding."""
     found = order_of(*measured(order, size=100.0))
 
     assert found.slope == pytest.approx(order, abs=1e-6)
@@ -62,17 +61,14 @@ def test_a_method_of_known_order_gives_its_order(order: int):
 
 
 def test_a_method_that_closes_in_on_something_else_is_flagged():
-    """Half a radius aside whatever dt is, and first order on top of it."""
     assert order_of(*measured(1, size=1.0, aside=0.1)).verdict == ELSEWHERE
 
 
 def test_a_method_on_its_way_is_not_flagged():
-    """The same first order without the part aside: negative control of the flag."""
     assert order_of(*measured(1, size=1.0)).verdict == ORDER
 
 
 def test_an_exact_method_has_no_order():
-    """Below the finest accuracy asked for there is only rounding."""
     found = order_of(*measured(1, size=1e-12))
 
     assert found.verdict == EXACT
@@ -80,8 +76,6 @@ def test_an_exact_method_has_no_order():
 
 
 def test_an_error_that_rises_with_a_finer_step_is_not_monotone():
-    """By more than a tenth; a rise below the finest accuracy asked for is rounding, and no
-    matter."""
     changes = np.full(4, 1.0)
 
     assert verdict_of(np.array([1e-1, 1e-2, 3e-2, 1e-3]), changes) == UNSTEADY
@@ -90,21 +84,16 @@ def test_an_error_that_rises_with_a_finer_step_is_not_monotone():
 
 
 def test_a_scatter_as_wide_as_its_fall_is_no_order():
-    """The error falls from step to step, but once by 0.1 % and once by a thousandfold: the slope
-    may be anything."""
     errors = np.array([[1.0, 0.999, 0.998, 0.001]])
 
     assert order_of(DT[:4], errors, np.ones((1, 4))).verdict == UNCLEAR
 
 
 def test_too_few_points_are_no_order():
-    """A straight line through two points has no scatter."""
     assert order_of(DT[:2], np.array([[1.0, 0.5]]), np.array([[np.nan, 0.5]])).verdict == UNKNOWN
 
 
 def test_the_slope_of_many_samples_has_an_interval_that_holds_the_order():
-    """Errors c dt with c sampled anew for every seed and dt, as the phase of a collision in its
-    step is."""
     rng = np.random.default_rng(0)
     errors = rng.uniform(0.2, 1.8, (64, len(DT))) * DT
     found = order_of(DT, errors, np.full(errors.shape, 1.0))
@@ -114,8 +103,8 @@ def test_the_slope_of_many_samples_has_an_interval_that_holds_the_order():
 
 
 def test_the_bootstrap_interval_covers_the_median_as_often_as_it_says():
-    """Medians of 16 normal numbers: 95 % intervals hold 0 in 90 % to 99 % of 400 trials (binomial:
-    +- 3 %)."""
+    # Medians of 16 normal numbers: 95 % intervals hold 0 in 90 % to 99 % of 400 trials (binomial:
+    # +- 3 %).
     rng = np.random.default_rng(1)
     held = 0
     for trial in range(400):
@@ -126,7 +115,7 @@ def test_the_bootstrap_interval_covers_the_median_as_often_as_it_says():
 
 
 def test_the_bootstrap_of_a_mean_is_as_wide_as_theory_says():
-    """The mean of m numbers of unit spread: 2 x 1.96 / sqrt(m), to 15 % (1000 resamples)."""
+    # The mean of m numbers of unit spread: 2 x 1.96 / sqrt(m), to 15 % (1000 resamples).
     values = np.random.default_rng(2).normal(size=400)
     low, high = bootstrap(values, lambda sample: float(sample.mean()))
 
@@ -134,7 +123,6 @@ def test_the_bootstrap_of_a_mean_is_as_wide_as_theory_says():
 
 
 def test_a_failed_draw_widens_the_interval_up_to_infinity():
-    """Half of the samples failed: the median may be anything above."""
     low, high = median_interval(np.array([1.0, 2.0, np.inf, np.inf]))
 
     assert low == 1.0
@@ -142,8 +130,6 @@ def test_a_failed_draw_widens_the_interval_up_to_infinity():
 
 
 def test_the_front_is_who_nobody_beats():
-    """Cheapest first; of equal cost the more accurate, of equal error the cheaper; without a cost:
-    left out."""
     cost = np.array([1.0, 2.0, 2.0, 4.0, 8.0, np.nan, 16.0])
     error = np.array([9.0, 5.0, 4.0, 6.0, 4.0, 0.0, 1.0])
 
@@ -151,8 +137,8 @@ def test_the_front_is_who_nobody_beats():
 
 
 def test_the_cost_of_an_accuracy_is_that_of_the_cheapest_dt_that_keeps_it():
-    """Errors 0.5, 0.02, 0.2, 0.05, 0.01: a lucky second step size does not count, as a finer one is
-    worse again."""
+    # Errors 0.5, 0.02, 0.2, 0.05, 0.01: a lucky second step size does not count, as a finer one is
+    # worse again.
     cost, error = 1.0 / DT, np.array([0.5, 0.02, 0.2, 0.05, 0.01])
 
     assert cost_to_reach(0.1, DT, cost, error, ORDER)[:2] == (cost[3], DT[3])
@@ -160,7 +146,6 @@ def test_the_cost_of_an_accuracy_is_that_of_the_cheapest_dt_that_keeps_it():
 
 
 def test_in_a_scene_a_smaller_error_never_costs_less():
-    """Whatever errors and costs a ladder of step sizes has, as far as both are reached."""
     rng = np.random.default_rng(0)
     for _ in range(300):
         cost, error = rng.lognormal(size=5), 10.0 ** rng.uniform(-8, 0, 5)
@@ -170,8 +155,6 @@ def test_in_a_scene_a_smaller_error_never_costs_less():
 
 
 def test_a_smaller_error_that_seems_cheaper_is_explained_by_the_scenes():
-    """Pooled over other scenes: a cheap one that alone reaches the smaller error. The control: with
-    the costs of the same scenes nothing is said."""
     columns = ["engine", "profile", "accuracy", "cost", "got", "of"]
     own = [
         ("reference", "exercise", "1 %", 70.0, 24, 38),
@@ -187,7 +170,6 @@ def test_a_smaller_error_that_seems_cheaper_is_explained_by_the_scenes():
 
 
 def test_what_is_not_reached_says_why():
-    """Not down to the finest dt, at no dt at all, or nothing was played."""
     cost, error = 1.0 / DT, np.array([0.5, 0.4, 0.3, 0.25, 0.21])
 
     assert cost_to_reach(0.1, DT, cost, error, ORDER).why == NOT_REACHED
@@ -197,7 +179,6 @@ def test_what_is_not_reached_says_why():
 
 
 def test_a_failed_finest_step_does_not_pass_for_an_accuracy():
-    """The step size below the failed one was accurate, but it is not known whether it stays so."""
     error = np.array([0.5, 0.05, 0.05, 0.05, np.inf])
 
     assert cost_to_reach(0.1, DT, 1.0 / DT, error, ORDER).why == NOT_REACHED
@@ -218,8 +199,8 @@ def costs_of(name: str, costs: list[float]) -> pd.DataFrame:
 
 
 def test_engines_are_compared_in_the_scenes_that_both_reach():
-    """The yardstick is cheaper wherever both get there, and also gets to two dear scenes: it costs
-    less; its median over all scenes is the larger, as once in the table of the quick form."""
+    # The yardstick is cheaper wherever both get there, and also gets to two dear scenes: it costs
+    # less; its median over all scenes is the larger, as once in the table of the quick form.
     own = costs_of(YARDSTICK, [10.0, 10.0, 10.0, 900.0, 900.0, np.nan, np.nan])
     other = costs_of("pymunk:matched", [30.0, 30.0, 30.0, np.nan, np.nan, 30.0, 30.0])
     medians = [float(np.median(each.cost.fillna(np.inf))) for each in (own, other)]

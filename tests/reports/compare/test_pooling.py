@@ -12,7 +12,6 @@ from crosscheck2d.reports.compare.order import FINEST
 from crosscheck2d.reports.compare.pooling import middle_half, moved, pooled, said_of_pool
 from crosscheck2d.reports.run.scenes import open_scene
 from crosscheck2d.reports.speed import ladder
-from crosscheck2d.reports.speed.ladder import scored
 from crosscheck2d.reports.speed.plan import QUICK
 from crosscheck2d.scenarios.model import Array
 
@@ -31,8 +30,8 @@ STEP_SIZES = 3  # those that every scene has
 
 
 def test_the_middle_half_of_known_values():
-    """Of four the two in the middle; of three the middle one counts 2/3 and each other 1/6; of one
-    itself."""
+    # Of four the two in the middle; of three the middle one counts 2/3 and each other 1/6; of one
+    # itself.
     assert middle_half(np.array([1e9, 1.0, 100.0, 10.0])) == pytest.approx(np.sqrt(1000))
     assert middle_half(np.array([1.0, 8.0, 64.0])) == pytest.approx(8.0)
     assert middle_half(np.array([1.0, 1.0, 64.0])) == pytest.approx(64 ** (1 / 6))
@@ -41,8 +40,6 @@ def test_the_middle_half_of_known_values():
 
 
 def test_a_quarter_may_fail_or_be_exact_but_no_more():
-    """inf among the upper quarter and 0 among the lower have no weight; one more of the former, and
-    all is infinite."""
     values = np.array([0.0, 0.0, 2.0, 2.0, 2.0, 2.0, np.inf, np.inf])
 
     assert middle_half(values) == pytest.approx(2.0)
@@ -50,8 +47,6 @@ def test_a_quarter_may_fail_or_be_exact_but_no_more():
 
 
 def test_what_one_value_moves_is_found():
-    """Nothing where all are equal; below the floor nothing counts; one too many that fails moves it
-    to infinity."""
     assert moved(np.full(8, 3.0)) == pytest.approx(np.ones(8))
     assert moved(np.array([1e-12, 1e-9, 1e-8]), floor=1e-6) == pytest.approx(np.ones(3))
     assert moved(np.array([1.0, 2.0, 4.0]), floor=0.0).max() > 1.2
@@ -73,21 +68,7 @@ def errors_of(scenes: tuple[str, ...], names: tuple[str, ...]) -> dict[tuple[str
 
 
 def most_moved(errors: dict[tuple[str, int], Array]) -> float:
-    """The largest factor by which a pooled point moves if a scene is left out."""
     return max(moved(each, FINEST).max() for each in errors.values())
-
-
-def median_moved(errors: dict[tuple[str, int], Array]) -> float:
-    """The same of the median that was the statistic before, which is always one of the values."""
-    factors = [1.0]
-    for each in errors.values():
-        whole = max(np.percentile(each, 50, method="nearest"), FINEST)
-        others = [
-            max(np.percentile(np.delete(each, k), 50, method="nearest"), FINEST)
-            for k in range(len(each))
-        ]
-        factors += [max(other / whole, whole / other) for other in others]
-    return max(factors)
 
 
 STEPPING = ("reference:exercise", "pymunk:shipped", "box2d_v3:shipped")
@@ -95,7 +76,6 @@ STEPPING = ("reference:exercise", "pymunk:shipped", "box2d_v3:shipped")
 
 @pytest.mark.slow
 def test_no_one_scene_is_the_pooled_curve():
-    """Of three engines, the shipped ones being those whose errors are the farthest apart."""
     errors = errors_of(QUICK.scenes, STEPPING)
 
     assert most_moved(errors) < MOST
@@ -104,26 +84,12 @@ def test_no_one_scene_is_the_pooled_curve():
 
 
 @pytest.mark.slow
-def test_the_scenes_and_the_median_of_before_fail_both():
-    """Negative control: with the scenes of before the statistic moves by more, and their median was
-    free_fall's own closed form, a g dt t / 2 over the radius, at every step.
-    """
-    errors = errors_of(BEFORE, STEPPING)
-    fall = scored("free_fall", 0).scenario
-    g, t = float(np.linalg.norm(fall.scene.gravity)), fall.duration
-    for step_size in range(STEP_SIZES):
-        medians = np.percentile(errors["reference:exercise", step_size], 50, method="nearest")
-        assert medians == pytest.approx(
-            0.5 * fall.dt(2**step_size) * g * t / fall.scene.radius[0], rel=1e-9
-        )
-
-    assert most_moved(errors) > MOST
-    assert median_moved(errors) > 10 * MOST
+def test_with_the_scenes_of_before_one_scene_was_the_pooled_curve():
+    assert most_moved(errors_of(BEFORE, STEPPING)) > MOST
 
 
 @pytest.mark.long  # ten engines through fourteen scenes
 def test_no_one_scene_is_the_pooled_curve_of_any_engine():
-    """All engines and profiles."""
     assert most_moved(errors_of(QUICK.scenes, tuple(ENGINES))) < MOST
 
 
@@ -145,8 +111,6 @@ def points(costs: list[float], errors: list[float]) -> pd.DataFrame:
 
 
 def test_a_failed_scene_is_infinitely_dear_and_an_untimed_one_is_counted():
-    """Dropping the failed scene would make the engine cheaper: it was the dearest, which is why it
-    failed."""
     failed = pooled(points([1.0, 2.0, 4.0, np.nan], [0.1, 0.2, 0.4, np.inf])).iloc[0]
     untimed = pooled(points([1.0, 2.0, 4.0, np.nan], [0.1, 0.2, 0.4, 0.5])).iloc[0]
 
@@ -161,7 +125,6 @@ def test_a_failed_scene_is_infinitely_dear_and_an_untimed_one_is_counted():
 
 
 def test_a_pool_says_which_scene_moves_it_most():
-    """Leaving out the only scene between small and large errors moves the middle most."""
     reported = pooled(points([1.0] * 5, [1e-3, 1e-3, 0.1, 10.0, 10.0]))
 
     assert reported.moved.iloc[0] == pytest.approx(

@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from crosscheck2d.adapters.engines import ENGINES, row_of
-from crosscheck2d.adapters.play import play
+from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.compare import verdicts as judging
 from crosscheck2d.reports.compare.comparison import compare
@@ -17,7 +16,7 @@ from crosscheck2d.scenarios.catalogue import SCENARIOS, scenario
 from crosscheck2d.scenarios.files.scene_file import read_scene_file
 from crosscheck2d.scenarios.model import Scenario, Trajectory
 from crosscheck2d.scenarios.no_truth import answered
-from tests.reports.compare.answers import truth_of
+from tests.reports.compare.answers import run_engine, run_engines, truth_of
 
 CASES = Path(__file__).parents[3] / "tests" / "data" / "scenes"
 
@@ -42,7 +41,7 @@ def case(name: str) -> tuple[Scenario, Trajectory | None]:
 @cache
 def run(name: str, engine: str, substeps: int) -> Run:
     one, _ = case(name)
-    return play(row_of(engine).make(), engine, one, one.dt(substeps))
+    return run_engine(one, engine, substeps)
 
 
 def failed_by(name: str, engine: str, substeps: int) -> dict[str, Verdict]:
@@ -67,9 +66,7 @@ def test_the_exact_answer_fails_no_verdict(name: str):
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_event_driven_fails_no_verdict(name: str):
     one, truth = answered(scenario(name))
-    for substeps in one.substeps:
-        engine = ENGINES["event_driven:float64"].make()
-        played = play(engine, "event_driven:float64", one, one.dt(substeps))
+    for played in run_engines(one, "event_driven:float64"):
         if played.status == "ok":
             assert failed(one, played.trajectory, truth) == {}
 
@@ -82,15 +79,14 @@ def test_a_disk_that_wraps_past_a_wall_does_not_tunnel():
 def test_a_sample_on_the_edge_of_a_torus_is_no_way_across_the_box():
     one, _ = case("wrap_wall")
     fast = replace(one, scene=replace(one.scene, velocity=[[0.5 / one.sample_interval, 0.0]]))
-    played = play(row_of("event_driven:float64").make(), "event_driven:float64", fast, fast.dt(1))
-    assert played.trajectory is not None
+    played = run_engine(fast, "event_driven:float64")
     assert -2.0 in played.trajectory.position[:, 0, 0].round(12)
     assert failed(fast, played.trajectory) == {}
 
 
 @pytest.mark.parametrize("offset", [-0.5, 0.5])
 def test_velocities_of_half_a_step_before_or_after_gain_and_lose_no_energy(offset: float):
-    """A fall of a tenth of a second at 1/60 s: half a step is an eighth of its energy."""
+    # A fall of a tenth of a second at 1/60 s: half a step is an eighth of its energy.
     one, _ = truth_of("bouncing_ball_e1")
     dt = 1 / 60
     t = np.arange(9) * dt
@@ -105,12 +101,11 @@ def test_velocities_of_half_a_step_before_or_after_gain_and_lose_no_energy(offse
 
 
 def test_the_rounding_of_a_long_fall_is_no_momentum():
-    """At the end the momentum is twenty times that of the start, to which errors are relative."""
+    # At the end the momentum is twenty times that of the start, to which errors are relative.
     one, _ = truth_of("head_on_equal_e1")
     fall = replace(one.scene, gravity=[0.0, -10.0], velocity=[[-1.0, 0.0], [0.0, 1.0]])
     one = replace(one, scene=fall, truth=None, duration=3.0, sample_interval=0.02)
-    name = "box2d_v3:matched"
-    played = play(row_of(name).make(), name, one, 0.005)
+    played = run_engine(one, "box2d_v3:matched", 4)
     assert judging.first_failed(played, one, None) is None
 
 
@@ -122,7 +117,7 @@ def test_a_disk_that_rolls_over_the_pieces_of_a_floor_does_not_tunnel():
 
 
 def test_a_disk_that_had_time_to_go_round_the_end_of_a_wall_did_not_tunnel():
-    """Round the end of a wall at (0, 0), from below to above and back, in one sample interval."""
+    # Round the end of a wall at (0, 0), from below to above and back, in one sample interval.
     one, _ = truth_of("box_billiard")
     wall = replace(one.scene, walls=[[[-5.0, 0.0], [0.0, 0.0]]], position=[[-0.1, -0.3]])
     one = replace(one, scene=wall, truth=None)
@@ -142,20 +137,18 @@ def test_a_disk_that_had_time_to_go_round_the_end_of_a_wall_did_not_tunnel():
 
 
 def test_a_right_engine_that_detects_at_the_end_of_a_step_may_overlap_for_a_step():
-    """100 disks at e = 1: each sample has some overlap, each of another pair."""
+    # 100 disks at e = 1: each sample has some overlap, each of another pair.
     one = scenario("gas_of_100")
-    played = play(ENGINES["reference:exercise"].make(), "reference:exercise", one, one.dt(1))
-    assert played.trajectory is not None
+    played = run_engine(one, "reference:exercise")
     found = {each.id: each for each in verdicts(one, played.trajectory, played.dt)}
     assert not found["overlap"].failed
     assert judging.laws.penetration(played.trajectory, one.scene).max() > judging.MOST_OVERLAP
 
 
 def test_a_right_engine_may_overlap_at_each_sample_where_a_fast_disk_has_a_narrow_gap():
-    """25 m/s between a wall and a heavy disk: in each step of 1/60 s a collision is due."""
+    # 25 m/s between a wall and a heavy disk: in each step of 1/60 s a collision is due.
     one, truth = truth_of("galperin_314")
-    played = play(ENGINES["reference:coulomb"].make(), "reference:coulomb", one, one.dt(1))
-    assert played.trajectory is not None
+    played = run_engine(one, "reference:coulomb")
     assert not [v for v in verdicts(one, played.trajectory, played.dt, truth=truth) if v.failed]
 
 
@@ -256,9 +249,8 @@ def test_a_ball_that_rests_too_early_fails():
 def test_disks_that_others_drove_past_each_other_between_two_samples_did_not_tunnel(
     name: str, every: int
 ):
-    one, engine = scenario(name), "event_driven:float64"
-    played = play(ENGINES[engine].make(), engine, one, one.dt(one.substeps[-1])).trajectory
-    assert played is not None
+    one = scenario(name)
+    played = run_engine(one, "event_driven:float64", one.substeps[-1]).trajectory
     samples = ("t", "position", "velocity", "angle", "angular_velocity")
     rare = replace(played, **{field: getattr(played, field)[::every] for field in samples})
     one = replace(one, sample_interval=every * one.sample_interval, duration=float(rare.t[-1]))
@@ -303,7 +295,7 @@ def test_momentum_that_nothing_explains_fails():
 @pytest.mark.parametrize("name", ["heavy_on_light", "swapped"])
 @pytest.mark.parametrize("substeps", [1, 2, 4])
 def test_a_disk_that_falls_through_the_floor_has_tunnelled(name: str, substeps: int):
-    """The exact answer ends at 0.319 of 3 s, and the disk falls through the floor after it."""
+    # The exact answer ends at 0.319 of 3 s, and the disk falls through the floor after it.
     for engine in ("reference:exercise", "reference:coulomb"):
         found = failed_by(name, engine, substeps)["tunnelled"]
         assert found.at > 0.319, engine

@@ -18,9 +18,9 @@ from crosscheck2d.adapters.conformance.probe import loaded
 from crosscheck2d.adapters.engine import ContactImpulse, Unsupported
 from crosscheck2d.adapters.engine_row import EngineRow
 from crosscheck2d.adapters.engines import ENGINES
-from crosscheck2d.adapters.first_collisions import first_collisions
 from crosscheck2d.adapters.host.engine import OwnSolver
 from crosscheck2d.adapters.play import play
+from crosscheck2d.adapters.run import first_collisions
 from crosscheck2d.reports.game.divergence import (
     NEVER,
     WAIT,
@@ -29,14 +29,20 @@ from crosscheck2d.reports.game.divergence import (
     FirstCollision,
     Touches,
     cause_of,
-    contact,
     differing_since,
 )
-from crosscheck2d.reports.game.flight import EARTH, FRAME, Flight, field_scenario, free_place
-from crosscheck2d.reports.game.pilot import SHIP
+from crosscheck2d.reports.game.flight import (
+    EARTH,
+    FRAME,
+    SHIP,
+    Flight,
+    Flyer,
+    field_scenario,
+    free_place,
+)
 from crosscheck2d.scenarios.families.exercise import SHIP as START
 from crosscheck2d.scenarios.files.scene_file import read_scene_file, scene_text
-from crosscheck2d.scenarios.model import Scene
+from crosscheck2d.scenarios.model import Array, Scene, State
 from crosscheck2d.scenarios.no_truth import NoTruth
 from crosscheck2d.scenarios.truth.closed_forms import world_thrusts
 
@@ -56,7 +62,6 @@ EVENTS = [  # frame, key, down: a turn, a thrust across it, a renewed thrust, bo
 
 
 def with_edges(names: Iterable[str]) -> list[str]:
-    """Those that play the field; an engine may refuse its edges."""
     found = []
     for name in names:
         with suppress(Unsupported), loaded(ENGINES[name], field_scenario().scene):
@@ -70,7 +75,6 @@ def flown(
     events: Iterable[tuple[int, str, bool]] = EVENTS,
     **field: float,
 ) -> Flight:
-    """A flight steered by `events` (frame, key, down)."""
     flight = Flight(field_scenario(**field), names)  # type: ignore[arg-type]
     for frame, key, down in events:
         flight.advance(frame - flight.frame)
@@ -79,8 +83,16 @@ def flown(
     return flight
 
 
+def put_ship(flight: Flight, flyer: Flyer, **values: Array) -> State:
+    """The state of an engine, loaded anew with these of its ship."""
+    state = flyer.engine.read()
+    for name, value in values.items():
+        getattr(state, name)[SHIP] = value
+    flyer.engine.load(replace(flight.scenario.scene, **vars(state)), flight.dt)
+    return state
+
+
 def bits(flight: Flight) -> list[dict[str, bytes]]:
-    """The state of every engine."""
     return [
         {name: array.tobytes() for name, array in vars(flyer.state).items()}
         for flyer in flight.flyers
@@ -91,8 +103,6 @@ def bits(flight: Flight) -> list[dict[str, bytes]]:
     "name", ["reference:exercise", "pymunk:matched", "box2d:matched", "event_driven:float64"]
 )
 def test_keys_move_the_ship_as_the_exercise_says(name: str):
-    """Against x + v t + F t2 / 2m, thrusts of 0.25 m/s2 along the heading at the key event and
-    turns of 1 rad/s2."""
     flight = flown([name], 160, asteroids=0)
     scenario = flight.saved()
     truth = world_thrusts(scenario.scene, scenario.thrusts, scenario.times).at(-1)
@@ -112,8 +122,6 @@ def test_keys_move_the_ship_as_the_exercise_says(name: str):
 
 
 def test_a_thrust_keeps_its_direction_while_the_ship_turns():
-    """W aims once when it goes down, and anew when its event is repeated; the force's size is mass
-    times 0.25."""
     flight = flown(["reference:exercise"], 60, EVENTS[:4], asteroids=0)
     thrusts = [thrust for thrust in flight.saved().thrusts if thrust.force.any()]
     size = flight.scenario.scene.mass[SHIP] * 0.25
@@ -130,8 +138,8 @@ def test_a_thrust_keeps_its_direction_while_the_ship_turns():
 
 
 def test_releasing_either_key_of_a_pair_ends_the_thrust():
-    """As in the exercise: S takes over from W, and when S is released no force acts, though W is
-    still held."""
+    # As in the exercise: S takes over from W, and when S is released no force acts, though W is
+    # still held.
     flight = flown(
         ["reference:exercise"], 40, [(0, "w", True), (10, "s", True), (20, "s", False)], asteroids=0
     )
@@ -142,7 +150,6 @@ def test_releasing_either_key_of_a_pair_ends_the_thrust():
 
 
 def test_the_same_keys_give_the_same_flight():
-    """Bit for bit; another seed gives another."""
     one, two, other = (flown(list(ENGINES)[:3], 200, seed=seed) for seed in (3, 3, 4))
 
     assert bits(one) == bits(two)
@@ -151,8 +158,6 @@ def test_the_same_keys_give_the_same_flight():
 
 @pytest.mark.parametrize("substeps", [2, pytest.param(16, marks=pytest.mark.long)])
 def test_a_saved_flight_replays_to_the_same_bits(tmp_path: Path, substeps: int):
-    """Flown again, and played by `crosscheck run`'s own loop: every engine ends in the same
-    state."""
     names = with_edges(ENGINES)
     flight = flown(names, 150, substeps=substeps)
     path = tmp_path / "flight.toml"
@@ -190,7 +195,6 @@ def steered_home() -> list[tuple[int, str, bool]]:
 
 
 def test_a_scripted_flight_wins():
-    """Not on the way: only next to the earth, slow, and without spin."""
     events = steered_home()
     flight = flown(["reference:exercise"], events[-1][0] - 200, events[:-1], asteroids=0)
     on_the_way = flight.won
@@ -199,11 +203,10 @@ def test_a_scripted_flight_wins():
 
     assert not on_the_way
     assert flight.won
-    assert flight.frame - flight.won_at < 200
 
 
 def test_winning_is_the_exercises_rule_as_written():
-    """A squared distance below 0.5, so from 0.707 m on; spin may be as negative as it likes."""
+    # A squared distance below 0.5, so from 0.707 m on; spin may be as negative as it likes.
     flight = Flight(field_scenario(asteroids=0), ["reference:exercise"])
     state = flight.solid.state
     verdicts = []
@@ -222,7 +225,6 @@ def test_winning_is_the_exercises_rule_as_written():
 
 
 def test_a_ship_that_leaves_is_set_back_to_its_start():
-    """At rest, in each engine by itself; what is saved ends before, for a scene has no way back."""
     # Backwards: 1.5 m at 0.25 m/s2 take sqrt(12) s = 222 frames.
     flight = flown(
         ["reference:exercise", "box2d:matched"],
@@ -231,7 +233,7 @@ def test_a_ship_that_leaves_is_set_back_to_its_start():
         asteroids=0,
     )
 
-    assert [flyer.set_backs for flyer in flight.flyers] == [1, 1]
+    assert [len(flyer.edges) for flyer in flight.flyers] == [1, 1]
     assert 220 <= flight.left_at <= 223
     assert flight.solid.state.position[SHIP, 0] == pytest.approx(START[0], abs=0.05)
     assert flight.saved().duration == flight.left_at * FRAME
@@ -240,8 +242,6 @@ def test_a_ship_that_leaves_is_set_back_to_its_start():
 
 @pytest.mark.parametrize("name", ["reference:exercise", "pymunk:matched"])
 def test_a_ship_is_set_back_in_the_step_in_which_it_leaves(name: str):
-    """As in the exercise: the rest of the frame it is already under way again, thrusting from its
-    start and from rest."""
     flight = flown([name], 222, [(0, "s", True)], asteroids=0)
     while flight.left_at < 0:
         flight.advance()
@@ -267,8 +267,8 @@ def test_a_ship_is_set_back_in_the_step_in_which_it_leaves(name: str):
     ids=["two", "all"],
 )
 def test_looking_at_every_step_near_an_edge_changes_no_bit(names: Iterable[str]):
-    """The ship turns round 0.1 m before the edge, where it is looked at step by step; `play` looks
-    once a frame."""
+    # The ship turns round 0.1 m before the edge, where it is looked at step by step; `play` looks
+    # once a frame.
     keys = [(0, "s", True), (150, "s", False), (151, "w", True)]
     names = with_edges(names)
     flight = flown(names, 400, keys, seed=4, asteroids=8)
@@ -284,8 +284,8 @@ def test_looking_at_every_step_near_an_edge_changes_no_bit(names: Iterable[str])
 
 
 def test_the_marker_names_the_first_collision():
-    """pymunk as shipped has restitution 0.81 in a field of 0.9, so it diverges at the first
-    collision; the oracle names it."""
+    # pymunk as shipped has restitution 0.81 in a field of 0.9, so it diverges at the first
+    # collision; the oracle names it.
     flight = flown(["reference:exercise", "pymunk:shipped", "pymunk:matched"], 64, [])
     scenario = flight.saved()
     ghost, matched = flight.flyers[1:]
@@ -302,15 +302,12 @@ def test_the_marker_names_the_first_collision():
 
 
 def read_truth(scenario):  # type: ignore[no-untyped-def]
-    """The oracle's answer to a flight."""
     from crosscheck2d.scenarios.truth.exact import with_oracle
 
     return with_oracle(scenario).truth(scenario.times)
 
 
 class Failing:
-    """An engine that raises in its third frame."""
-
     def __init__(self, row: EngineRow) -> None:
         self.inner, self.frames = row.make(), 0
 
@@ -325,7 +322,6 @@ class Failing:
 
 
 def test_an_engine_that_fails_leaves_and_the_others_fly_on(monkeypatch: pytest.MonkeyPatch):
-    """With its reason; where it was the solid one, the next takes over."""
     row = ENGINES["pymunk:matched"]
     monkeypatch.setitem(
         ENGINES, "pymunk:matched", EngineRow(lambda: Failing(row), "fails", 0.0, 0.0)
@@ -362,7 +358,6 @@ def meeting(
     fails_at: int = 0,
     patience: float = 10.0,
 ) -> Flight:
-    """A flight of such files, which wait for each other so many s; the first fails."""
     barrier = Barrier(2, timeout=patience)
     for k, name in enumerate(names):
         make = partial(Meeting, barrier, 0 if k else fails_at)
@@ -371,8 +366,6 @@ def meeting(
 
 
 def test_files_fly_side_by_side_each_with_its_own_state(monkeypatch: pytest.MonkeyPatch):
-    """And in the order of their names: each has what it has alone. The control: a file that is
-    alone waits in vain."""
     flight = meeting(["a:own", "b:own"], monkeypatch)
     flight.key("w", True)
     flight.advance(20)
@@ -391,7 +384,6 @@ def test_files_fly_side_by_side_each_with_its_own_state(monkeypatch: pytest.Monk
 def test_a_file_that_raises_in_its_thread_leaves_and_the_others_fly_on(
     monkeypatch: pytest.MonkeyPatch,
 ):
-    """With its reason and the time, as an engine that flies in no thread."""
     flight = meeting(["a:own", "b:own"], monkeypatch, fails_at=3)
     flight.advance(3)
     left, other, _ = flight.flyers
@@ -401,7 +393,6 @@ def test_a_file_that_raises_in_its_thread_leaves_and_the_others_fly_on(
 
 
 def test_spin_is_part_of_the_energy():
-    """m v2 / 2 + I w2 / 2, and momentum m v, of all disks."""
     flight = Flight(field_scenario(), ["reference:exercise"])
     scene, reported = flight.scenario.scene, flight.measures(flight.solid)
     each = [
@@ -415,8 +406,6 @@ def test_spin_is_part_of_the_energy():
 
 
 def test_an_engine_leaves_by_the_flights_clock(monkeypatch: pytest.MonkeyPatch):
-    """What it says counts from when its ship was set back; the flight says when that was for who
-    looks on."""
     row = ENGINES["event_driven:float64"]
     monkeypatch.setitem(
         ENGINES, "event_driven:float64", replace(row, make=lambda: Accumulating(row))
@@ -426,7 +415,7 @@ def test_an_engine_leaves_by_the_flights_clock(monkeypatch: pytest.MonkeyPatch):
     left = flight.flyers[1]
     frame = round(left.left_at / FRAME)
 
-    assert left.set_backs == 1
+    assert len(left.edges) == 1
     assert 222 < frame < 240
     assert left.left == f"they accumulate at {left.touches.since + Accumulating.AT:.4g} s"
     assert left.left_at - FRAME <= left.touches.since + Accumulating.AT <= left.left_at + FRAME
@@ -449,15 +438,11 @@ class Accumulating(Failing):
 
 
 def test_ghosts_are_compared_after_the_ship_was_set_back():
-    """One that has stayed with the solid one so far diverges at a collision later on; the way back
-    itself is no divergence."""
     names = ["reference:exercise", "pymunk:matched", "box2d:matched"]
     flight = flown(names, 300, [(0, "s", True), (260, "s", False)], asteroids=0)
-    together = [(flyer.set_backs, flyer.divergence) for flyer in flight.flyers]
+    together = [(len(flyer.edges), flyer.divergence) for flyer in flight.flyers]
     struck = flight.flyers[1]
-    state = struck.engine.read()
-    state.velocity[SHIP] += 0.5
-    struck.engine.load(replace(flight.scenario.scene, **vars(state)), flight.dt)
+    state = put_ship(flight, struck, velocity=struck.state.velocity[SHIP] + 0.5)
     ahead = ContactImpulse(0, SHIP, -1, 1.0)  # of the next frame
     struck.touches.note([ahead], flight.frame, state, flight.frame * FRAME)
     flight.advance(20)
@@ -469,12 +454,9 @@ def test_ghosts_are_compared_after_the_ship_was_set_back():
 
 
 def test_a_ship_that_leaves_in_one_engine_only_diverges_at_the_edge():
-    """Not at a collision of long ago, and not while the other is about to follow."""
     flight = flown(["reference:exercise", "pymunk:matched"], 200, [(0, "s", True)], asteroids=0)
     slow = flight.flyers[1]
-    state = slow.engine.read()
-    state.position[SHIP, 0] += 0.3
-    slow.engine.load(replace(flight.scenario.scene, **vars(state)), flight.dt)
+    put_ship(flight, slow, position=slow.state.position[SHIP] + [0.3, 0.0])
     while flight.left_at < 0:
         flight.advance()
     soon = slow.divergence
@@ -489,8 +471,8 @@ def test_a_ship_that_leaves_in_one_engine_only_diverges_at_the_edge():
 
 
 def test_the_first_wrong_collision_is_named_though_the_pair_goes_on_colliding():
-    """As a solver with a wrong sign has it, whose disks stay in each other, and one of which then
-    strikes another; the place is that of the collision, not where the disks were thrown to."""
+    # As a solver with a wrong sign has it, whose disks stay in each other, and one of which then
+    # strikes another; the place is that of the collision, not where the disks were thrown to.
     scene = field_scenario().scene
     solid, ghost = Touches(scene, 1 / 1024, 0.0), Touches(scene, 1 / 1024, 0.0)
     before, thrown = scene.state, np.zeros((scene.n, 2))
@@ -508,20 +490,17 @@ def test_the_first_wrong_collision_is_named_though_the_pair_goes_on_colliding():
     at, in_solid, in_ghost = found[WAIT - 1]  # type: ignore[misc]
 
     assert (at.frame, at.i, at.j) == (10, 3, 4)
-    assert (at.x, at.y) == pytest.approx(
-        contact(before.position + before.velocity / 1024, scene.radius, 3, 4)
-    )
+    three, four = (before.position + before.velocity / 1024)[3:5]
+    share = scene.radius[3] / scene.radius[3:5].sum()
+    assert (at.x, at.y) == pytest.approx(tuple(three + share * (four - three)))
     assert (in_solid, in_ghost) == (True, True)
 
 
 def test_a_velocity_that_differs_without_a_collision_is_said_to():
-    """Not blamed on a collision of long ago: a ghost whose ship was slowed by hand."""
     names = ["reference:exercise", "pymunk:matched"]
     flight = flown(names, 40, [(0, "w", True), (20, "w", False)], asteroids=0)
     slow = flight.flyers[1]
-    state = slow.engine.read()
-    state.velocity[SHIP] *= 0.5
-    slow.engine.load(replace(flight.scenario.scene, **vars(state)), flight.dt)
+    put_ship(flight, slow, velocity=slow.state.velocity[SHIP] / 2)
     flight.advance(WAIT)
 
     assert slow.divergence is not None
@@ -530,8 +509,6 @@ def test_a_velocity_that_differs_without_a_collision_is_said_to():
 
 @pytest.mark.parametrize("name", ["reference:exercise", "event_driven:float64", "pymunk:matched"])
 def test_a_ship_whose_start_is_taken_is_set_back_beside_it(name: str):
-    """In every engine alike, also in one that cannot begin with an overlap: an asteroid is over the
-    start when the ship leaves."""
     scenario = field_scenario(asteroids=1)
     scene = replace(
         scenario.scene,
@@ -544,13 +521,12 @@ def test_a_ship_whose_start_is_taken_is_set_back_beside_it(name: str):
     flyer = flight.solid
     ship, rock = flyer.state.position
 
-    assert (flyer.left, flyer.set_backs, flyer.beside) == ("", 1, True)
+    assert (flyer.left, len(flyer.edges), flyer.beside) == ("", 1, True)
     assert np.hypot(*(ship - rock)) >= scene.radius.sum()
     assert np.hypot(*(ship - START)) < 2 * scene.radius.sum()
 
 
 def test_a_ship_whose_start_is_free_goes_there():
-    """And to the start, too, where no place is free."""
     scene = field_scenario(asteroids=1).scene
     crowd = replace(scene, radius=np.array([scene.radius[0], 20.0]))
 
@@ -559,8 +535,6 @@ def test_a_ship_whose_start_is_free_goes_there():
 
 
 def test_collisions_are_counted_as_a_run_counts_them():
-    """One by one, where a run looks at all of them: of the flight's own engines, and of a solver
-    whose pair collides in every step."""
     flight = flown(["reference:exercise", "pymunk:matched", "event_driven:float64"], 380)
     every = [ContactImpulse(k, 1, 2, 1e-3) for k in range(100)]
     counted = Touches(flight.scenario.scene, flight.dt, 2e-3)

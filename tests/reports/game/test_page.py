@@ -17,8 +17,7 @@ from playwright.sync_api import Browser, Page
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.adapters.play import play
 from crosscheck2d.reports.commands.serve import application
-from crosscheck2d.reports.game.flight import FRAME
-from crosscheck2d.reports.game.pilot import SHIP
+from crosscheck2d.reports.game.flight import FRAME, SHIP
 from crosscheck2d.reports.game.server import Game
 from crosscheck2d.scenarios.files.scene_file import read_scene_file
 from crosscheck2d.scenarios.truth.closed_forms import world_thrusts
@@ -30,16 +29,15 @@ FLOWN = ["reference:exercise", "pymunk:shipped", "box2d:matched", "event_driven:
 
 @pytest.fixture(scope="module")
 def url() -> Iterator[str]:
-    """Where the game is served."""
     with served(application(Game(FLOWN))) as url:
         yield url
 
 
 @contextmanager
-def paused(browser: Browser, url: str) -> Iterator[Page]:
+def paused(browser: Browser, url: str, width: int = 1280, height: int = 900) -> Iterator[Page]:
     """The game, paused at its first frame; whatever it complained of fails the test."""
     page, heard = opened(
-        browser, url, viewport={"width": 1280, "height": 900}, reduced_motion="reduce"
+        browser, url, viewport={"width": width, "height": height}, reduced_motion="reduce"
     )
     page.wait_for_function("() => game.field")
     yield page
@@ -49,20 +47,17 @@ def paused(browser: Browser, url: str) -> Iterator[Page]:
 
 @pytest.fixture
 def page(browser: Browser, url: str) -> Iterator[Page]:
-    """A game to fly."""
     with paused(browser, url) as page:
         yield page
 
 
 @pytest.fixture(scope="module")
 def first_frame(browser: Browser, url: str) -> Iterator[Page]:
-    """A game to look at, opened once: it stays at its first frame."""
     with paused(browser, url) as page:
         yield page
 
 
 def wish(page: Page, **fields: object) -> None:
-    """A new field."""
     for name, value in fields.items():
         before = page.evaluate("game.field && (game.field.seen = true)")
         page.locator(f"#wishes [name={name}]").fill(str(value))
@@ -86,7 +81,6 @@ def fly(page: Page, frames: int) -> None:
 
 
 def saved(page: Page, folder: Path) -> Path:
-    """The file that "Save flight" gives."""
     with page.expect_download() as download:
         page.locator("#save").click()
     path = folder / download.value.suggested_filename
@@ -96,8 +90,8 @@ def saved(page: Page, folder: Path) -> Path:
 
 @pytest.mark.slow
 def test_keys_held_and_released_move_the_ship(page: Page):
-    """W held for 64 frames, then a turn by A: x = a t2 / 2 + v t, angle = t2 / 2 (0.25 m/s2, 1
-    rad/s2)."""
+    # W held for 64 frames, then a turn by A: x = a t2 / 2 + v t, angle = t2 / 2 (0.25 m/s2, 1
+    # rad/s2).
     wish(page, asteroids=0)
     keys = page.keyboard
     keys.down("w")
@@ -119,7 +113,6 @@ def test_keys_held_and_released_move_the_ship(page: Page):
 
 @pytest.mark.long
 def test_a_scripted_flight_wins(page: Page):
-    """With the keys of `steered_home` pressed and released in the page."""
     wish(page, asteroids=0)
     banners = []
     for frame, key, down in steered_home():
@@ -132,8 +125,6 @@ def test_a_scripted_flight_wins(page: Page):
 
 
 def test_every_number_of_the_table_has_four_digits(first_frame: Page):
-    """However large it is; a component of momentum has no more decimals than the larger one, and
-    what is rounding has one digit."""
     values = [9.8765432109, 12345.678901, 0.0123456, 0.99999, 4.2e-5, 3.1e-16, 7654321.0, 0]
     shown = [first_frame.evaluate("(value) => figure(value)", value) for value in values]
     vectors = [
@@ -157,7 +148,6 @@ def test_every_number_of_the_table_has_four_digits(first_frame: Page):
 
 
 def test_the_last_collision_before_a_divergence_is_named(first_frame: Page):
-    """Its bodies, its time, and in which engine it is."""
     story = "(diverged) => game.story({ diverged }, 'pymunk:shipped')"
     last = {"t": 2.351, "only": FLOWN[0], "solid": FLOWN[0]}
     said = [
@@ -180,8 +170,8 @@ def test_the_last_collision_before_a_divergence_is_named(first_frame: Page):
 def test_ghosts_part_after_the_first_collision_and_the_marker_names_the_pair(
     page: Page, tmp_path: Path
 ):
-    """pymunk as shipped makes e2 of e: it diverges at the first collision, whose pair and
-    instant the exact answer reports."""
+    # pymunk as shipped makes e2 of e: it diverges at the first collision, whose pair and instant
+    # the exact answer reports.
     fly(page, 16)
     together = [flyer["deviation"] for flyer in page.evaluate("game.now.flyers")]
     page.locator("#stop").check()
@@ -205,8 +195,6 @@ def test_ghosts_part_after_the_first_collision_and_the_marker_names_the_pair(
 
 @pytest.mark.slow
 def test_a_flight_by_the_clock_is_saved_as_it_was_flown(page: Page, tmp_path: Path):
-    """Real keys in real time; the file, played by the harness, ends in the very state that the page
-    showed."""
     wish(page, asteroids=0)
     page.locator("#pause").click()
     page.wait_for_function("() => game.now.frame > 5")
@@ -242,8 +230,6 @@ def test_a_flight_by_the_clock_is_saved_as_it_was_flown(page: Page, tmp_path: Pa
 def test_a_saved_flight_is_shown_again_to_the_same_bits(
     browser: Browser, page: Page, tmp_path: Path
 ):
-    """By `crosscheck play FLIGHT.toml`: it ends by itself, where the first flight was saved, and
-    takes no keys."""
     page.keyboard.down("w")
     fly(page, 50)
     page.keyboard.up("w")
@@ -266,7 +252,6 @@ def test_a_saved_flight_is_shown_again_to_the_same_bits(
 
 @pytest.mark.slow
 def test_any_scene_file_can_be_flown(browser: Browser):
-    """Walls, static disks and no wrap: drawn and played to its end, with no earth to win."""
     scenario = read_scene_file(
         Path(__file__).parents[3] / "tests" / "data" / "scenes" / "bumper.toml"
     )
@@ -283,7 +268,6 @@ def test_any_scene_file_can_be_flown(browser: Browser):
 
 @pytest.mark.slow
 def test_a_finger_steers_too(page: Page):
-    """The button acts as long as it is held."""
     wish(page, asteroids=0)
     box = page.locator("[data-key=w]").bounding_box()
     assert box is not None
@@ -298,7 +282,6 @@ def test_a_finger_steers_too(page: Page):
 
 @pytest.mark.slow
 def test_a_lost_connection_is_reported_and_mended(page: Page):
-    """The page says so, and begins anew when the server is there again."""
     fly(page, 3)
     page.evaluate("game.socket.close(); game.field.seen = true")
     page.wait_for_function(
@@ -309,7 +292,6 @@ def test_a_lost_connection_is_reported_and_mended(page: Page):
 
 @pytest.mark.slow
 def test_another_engine_can_be_solid(page: Page):
-    """Its row is first in the flight; a ghost can be left out."""
     page.locator("[name=solid][value='pymunk:shipped']").check()
     page.wait_for_function("() => game.field.engines[0] === 'pymunk:shipped'")
     page.locator("[name=flies][value='box2d:matched']").uncheck()
@@ -323,8 +305,6 @@ def test_another_engine_can_be_solid(page: Page):
 
 
 def test_the_page_fits_and_is_reached_by_keyboard(browser: Browser, url: str):
-    """Nothing scrolls sideways, on a phone not even the table, where the name of an engine is one
-    line; Tab comes to every control, with a visible outline."""
     page, heard = opened(browser, url, viewport={"width": 400, "height": 800}, color_scheme="dark")
     page.wait_for_function("() => game.field && game.now.frame > 10", timeout=20_000)
     too_wide = overhang(page)
@@ -368,7 +348,6 @@ def test_the_page_fits_and_is_reached_by_keyboard(browser: Browser, url: str):
 
 
 def test_the_table_is_on_the_first_screen(first_frame: Page):
-    """All engines at 1280 x 900."""
     bottom = first_frame.evaluate(
         "document.querySelector('.engines').getBoundingClientRect().bottom"
     )
@@ -403,8 +382,6 @@ RADII = """() => {
 
 
 def test_labels_of_rings_at_one_place_do_not_lie_on_each_other(first_frame: Page):
-    """Nor on the ship's name, nor outside of the field, wherever the place is; their rings have
-    different radii."""
     width, height, _ = first_frame.evaluate("game.sky.size")
     first, second, elsewhere = first_frame.evaluate(RADII)
 
@@ -419,7 +396,6 @@ def test_labels_of_rings_at_one_place_do_not_lie_on_each_other(first_frame: Page
 
 
 def test_with_reduced_motion_nothing_moves_by_itself(first_frame: Page):
-    """The flight waits for the engine."""
     first_frame.wait_for_timeout(200)
 
     assert first_frame.evaluate("[game.now.frame, game.paused]") == [0, True]
@@ -428,8 +404,6 @@ def test_with_reduced_motion_nothing_moves_by_itself(first_frame: Page):
 
 @pytest.mark.long
 def test_the_frame_time_is_measured_by_a_command():
-    """`python -m tests.bench.game` prints a row for each thing timed, and how fast the flight
-    goes."""
     words = [sys.executable, "-m", "tests.bench.game", "1"]
     done = subprocess.run(
         words, cwd=Path(__file__).parents[3], capture_output=True, text=True, timeout=120
@@ -447,7 +421,6 @@ def test_the_frame_time_is_measured_by_a_command():
 
 @pytest.mark.slow
 def test_the_page_tells_its_frame_time(page: Page):
-    """Pictures a second, and what the engines take of a frame."""
     fly(page, 30)
 
     assert re.search(
@@ -457,8 +430,6 @@ def test_the_page_tells_its_frame_time(page: Page):
 
 @pytest.mark.slow
 def test_a_page_of_an_earlier_server_is_loaded_anew(browser: Browser):
-    """Started again with other engines on the same port, as after a change of one's solver: the new
-    ones fly."""
     game = Game(["reference:exercise", "pymunk:shipped"])
     with served(application(game)) as url:
         page, heard = opened(browser, url, reduced_motion="reduce")

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import http.client
 import json
+import re
 import signal
 import socket
 import subprocess
-import sys
 import threading
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
+from typing import NamedTuple
+from urllib.parse import urlsplit
 
 import pytest
 import uvicorn
@@ -21,59 +23,56 @@ from websockets.sync.client import ClientConnection, connect
 
 from crosscheck2d.adapters.box2d_v3 import Box2DV3
 from crosscheck2d.adapters.engines import ENGINES
-from crosscheck2d.reports.commands.serve import application, play
+from crosscheck2d.adapters.host.engine import TEMPLATES
+from crosscheck2d.reports.commands.serve import application
 from crosscheck2d.reports.game.flight import field_scenario
 from crosscheck2d.reports.game.server import MOST_A_SECOND, MOST_FAULTS, Game
-from crosscheck2d.reports.page.server import MOST_TABS, config_of, serve, taken_socket
+from crosscheck2d.reports.page import server
+from crosscheck2d.reports.page.server import MOST_TABS
 from tests.reports.game.test_flight import bits, flown
+from tests.reports.page import browsing
+from tests.reports.terminal.command_line import CROSSCHECK, crosscheck
 
 FLOWN = ["reference:exercise", "pymunk:shipped"]
 FRAME = json.dumps({"do": "frames", "count": 1})
+SOLVER = Path(__file__).parents[2] / "solvers" / "correct" / "plain.js"
+TOP = 'name = "a"\nduration = 1.0\nsample_interval = 0.5\nrestitution = {}\n'
+DISK = "[[disk]]\nposition = [{}, 0.0]\nvelocity = [0.0, 0.0]\nradius = 0.1\nmass = 1.0\n"
+TEMPLATE = TEMPLATES["javascript"].read_text()
+FILES = {
+    "bad.toml": TOP.format(2.0) + DISK.format(0.0),
+    "crowd.toml": TOP.format(1.0) + "".join(DISK.format(x) for x in range(201)),
+    "cut.js": "function integrate(sphere, dt) {",
+    "empty.js": "var nothing = 0;",
+    "throws.js": "throw new Error('not today')",
+    "bytes.js": "\0\1\2",
+    "walls.js": TEMPLATE.replace('models = "disks walls', 'models = "walls'),
+    **{f"{k}.js": SOLVER.read_text() for k in range(17)},
+}
 
 
-class Served:
-    """A server in a thread of its own, on a free port."""
-
-    def __init__(self) -> None:
-        self.game = Game(FLOWN)
-        listening = taken_socket(0)
-        self.port = listening.getsockname()[1]
-        self.origin = f"http://localhost:{self.port}"
-        self.server = uvicorn.Server(config_of(application(self.game)))
-        self.thread = threading.Thread(
-            target=self.server.run, kwargs={"sockets": [listening]}, daemon=True
-        )
-        self.thread.start()
+class Served(NamedTuple):
+    game: Game
+    port: int
 
     def open(self, origin: str | None = "", **options: object) -> ClientConnection:
         """A tab; `origin` "": the server's own page."""
-        origin = self.origin if origin == "" else origin
+        origin = f"http://localhost:{self.port}" if origin == "" else origin
         return connect(f"ws://localhost:{self.port}/fly", origin=origin, **options)  # type: ignore[arg-type]
-
-    def get(self, path: str, host: str) -> tuple[int, str]:
-        """Status and text of a page asked for under the name `host`."""
-        asked = http.client.HTTPConnection("127.0.0.1", self.port, timeout=10)
-        asked.request("GET", path, headers={"Host": host})
-        answer = asked.getresponse()
-        return answer.status, answer.read().decode()
 
 
 @pytest.fixture(scope="module")
 def served() -> Iterator[Served]:
-    """One server for all tests here."""
-    served = Served()
-    yield served
-    served.server.should_exit = True
-    served.thread.join()
+    game = Game(FLOWN)
+    with browsing.served(application(game)) as url:
+        yield Served(game, urlsplit(url).port or 0)
 
 
 def hear(tab: ClientConnection) -> dict:
-    """The next answer."""
     return json.loads(tab.recv(timeout=10))
 
 
 def flood(tab: ClientConnection, text: str, count: int) -> None:
-    """Send `text` so often, then listen until the tab is closed."""
     for _ in range(count):
         tab.send(text)
     while True:
@@ -81,7 +80,6 @@ def flood(tab: ClientConnection, text: str, count: int) -> None:
 
 
 def still_flies(served: Served) -> bool:
-    """Whether a new tab gets its field and a frame."""
     with served.open() as tab:
         first = hear(tab)
         tab.send(FRAME)
@@ -89,7 +87,6 @@ def still_flies(served: Served) -> bool:
 
 
 def no_tabs(served: Served) -> bool:
-    """Whether all flights are given back, now or within a second."""
     for _ in range(100):
         if served.game.tabs == 0:
             return True
@@ -112,7 +109,6 @@ def no_tabs(served: Served) -> bool:
     ],
 )
 def test_pages_of_other_origins_cannot_drive_it(served: Served, origin: str | None):
-    """403 before a flight is made; the same tab from its own origin is let in."""
     with (
         pytest.raises(InvalidStatus) as refusal,
         served.open(origin and origin.format(port=served.port)),
@@ -124,13 +120,16 @@ def test_pages_of_other_origins_cannot_drive_it(served: Served, origin: str | No
 
 
 def test_the_page_is_given_under_this_machines_names_only(served: Served):
-    """A name that somebody else's DNS points here gets nothing."""
-    assert served.get("/", f"localhost:{served.port}")[0] == 200
-    assert served.get("/", "evil.example")[0] == 400
+    status = []
+    for host in (f"localhost:{served.port}", "evil.example"):
+        connection = http.client.HTTPConnection("127.0.0.1", served.port, timeout=10)
+        connection.request("GET", "/", headers={"Host": host})
+        status.append(connection.getresponse().status)
+
+    assert status == [200, 400]
 
 
 def test_malformed_messages_are_answered_and_then_cut_off(served: Served):
-    """Each with a sentence; the flight goes on; after too many the tab is closed."""
     with served.open() as tab:
         hear(tab)
         for text in ("{", '{"do": "jump"}', b"\xff\x00", '{"do": "frames", "count": 1e9}'):
@@ -145,7 +144,6 @@ def test_malformed_messages_are_answered_and_then_cut_off(served: Served):
 
 
 def test_a_large_message_closes_its_tab_only(served: Served):
-    """1009, message too big."""
     with served.open() as tab, served.open() as other:
         hear(tab), hear(other)
         with pytest.raises(ConnectionClosed) as closed:
@@ -158,7 +156,6 @@ def test_a_large_message_closes_its_tab_only(served: Served):
 
 
 def test_a_flood_closes_its_tab_only(served: Served):
-    """More messages a second than a page sends."""
     with served.open() as tab:
         hear(tab)
         with pytest.raises(ConnectionClosed, match=f"{MOST_A_SECOND} messages a second"):
@@ -168,7 +165,6 @@ def test_a_flood_closes_its_tab_only(served: Served):
 
 
 def test_a_tab_that_does_not_read_holds_nobody_up(served: Served):
-    """It asks for frames and takes none."""
     with served.open(max_queue=1, close_timeout=0.1) as slow:
         for _ in range(100):
             slow.send(FRAME)
@@ -176,8 +172,6 @@ def test_a_tab_that_does_not_read_holds_nobody_up(served: Served):
 
 
 def test_ten_tabs_fly_their_own_flights_and_give_them_back(served: Served):
-    """Each counts its own frames; a tab whose connection is cut is closed, too; one too many is
-    reported."""
     assert no_tabs(served)
     with ExitStack() as stack:
         tabs = [stack.enter_context(served.open()) for _ in range(10)]
@@ -199,8 +193,8 @@ def test_ten_tabs_fly_their_own_flights_and_give_them_back(served: Served):
 
 
 def test_a_flight_is_the_same_whatever_another_tab_does_meanwhile(monkeypatch: pytest.MonkeyPatch):
-    """Box2D 3.1 has one unit of length for all its worlds: another tab's world is made before or
-    after, not within."""
+    # Box2D 3.1 has one unit of length for all its worlds: another tab's world is made before or
+    # after, not within.
     alone = flown(["box2d_v3:shipped"], 100)
     other, options, tabs = ENGINES["box2d_v3:matched"].make(), Box2DV3._options, []
 
@@ -223,10 +217,7 @@ def test_a_flight_is_the_same_whatever_another_tab_does_meanwhile(monkeypatch: p
 
 @pytest.mark.slow
 def test_ctrl_c_stops_it_cleanly_and_a_taken_port_is_reported(served: Served, tmp_path: Path):
-    """Exit 0, no traceback, with a tab open; where the port is taken the next free one is used and
-    named."""
-    program = Path(sys.executable).parent / "crosscheck"
-    arguments = [program, "play", "--port", str(served.port), "--engine", "reference"]
+    arguments = [CROSSCHECK, "play", "--port", str(served.port), "--engine", "reference"]
     with subprocess.Popen(
         arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path
     ) as started:
@@ -244,47 +235,61 @@ def test_ctrl_c_stops_it_cleanly_and_a_taken_port_is_reported(served: Served, tm
 
 
 @pytest.mark.parametrize(
-    ("flight", "engines", "said"),
+    ("words", "lines"),
     [
-        ("nowhere.toml", [], "nowhere.toml: no such file"),
-        ("bad.toml", [], "bad.toml: restitution = 2.0"),
-        ("crowd.toml", [], "201 disks; the page shows at most 200"),
-        (None, ["boxed2d"], "did you mean box2d"),
+        ("nowhere.toml", ["nowhere.toml: no such file"]),
+        ("bad.toml", ["bad.toml: restitution = 2.0"]),
+        ("crowd.toml", ["crowd.toml: 201 disks; the page shows at most 200"]),
+        ("0.js", ["0.js: is a solver, not a flight; fly it with --engine 0.js"]),
+        ([""], ['"": is not there; name a file']),
+        ("--engine boxed2d", ["did you mean box2d"]),
+        (
+            "".join(f"--engine {k}.js " for k in range(17)),
+            ["--engine: 17 engines; at most 16 fly at once"],
+        ),
+        pytest.param(
+            "--engine cut.js --engine reference", ["cut.js: SyntaxError"], marks=pytest.mark.slow
+        ),
+        pytest.param(
+            "--engine bytes.js --engine 0.js --engine empty.js",
+            ["bytes.js: is not text", "empty.js: has neither the functions of the exercise"],
+            marks=pytest.mark.slow,
+        ),
+        pytest.param("--engine throws.js", ["^throws.js: .*not today"], marks=pytest.mark.slow),
+        pytest.param(
+            "--engine walls.js",
+            ["walls.js: does not model more than one disk"],
+            marks=pytest.mark.slow,
+        ),
     ],
 )
-def test_bad_input_is_reported_and_nothing_is_served(
-    flight: str | None,
-    engines: list[str],
-    said: str,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
+def test_bad_input_is_a_line_each_and_nothing_is_served(
+    words: str | list[str], lines: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    """A line a fault, exit 2."""
-    top = 'name = "a"\nduration = 1.0\nsample_interval = 0.5\nrestitution = {}\n'
-    disk = "[[disk]]\nposition = [{}, 0.0]\nvelocity = [0.0, 0.0]\nradius = 0.1\nmass = 1.0\n"
-    (tmp_path / "bad.toml").write_text(top.format(2.0) + disk.format(0.0))
-    (tmp_path / "crowd.toml").write_text(
-        top.format(1.0) + "".join(disk.format(x) for x in range(201))
-    )
-    with pytest.raises(SystemExit) as exit:
-        play(tmp_path / flight if flight else None, engines, 8000, False)
+    monkeypatch.setattr(server, "serve", lambda *_: pytest.fail("it was served"))
+    for name, text in FILES.items():
+        (tmp_path / name).write_text(text)
+    engines = list(ENGINES)
+    done = crosscheck("play", *(words.split() if isinstance(words, str) else words), cwd=tmp_path)
 
-    assert exit.value.code == 2
-    assert said in capsys.readouterr().err
+    assert (done.returncode, done.stdout) == (2, "")
+    assert len(done.stderr.splitlines()) == len(lines)
+    for line, pattern in zip(done.stderr.splitlines(), lines):
+        assert re.search(pattern, line)
+        assert line.count(".js: ") <= 1
+    assert list(ENGINES) == engines
 
 
 def test_a_port_that_nobody_may_have_is_not_called_taken(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
-    """As 80, unless one is an administrator; another is not tried in its place."""
-
     class Kept(socket.socket):
         def bind(self, _: object) -> None:
             raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr(socket, "socket", Kept)
     with pytest.raises(SystemExit) as exit:
-        serve(application(Game(FLOWN)), 80, "/", False)
+        server.serve(application(Game(FLOWN)), 80, "/", False)
 
     assert exit.value.code == 2
     assert "--port 80: the system keeps it for administrators" in capsys.readouterr().err
@@ -293,13 +298,12 @@ def test_a_port_that_nobody_may_have_is_not_called_taken(
 def test_a_missing_browser_is_reported(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
-    """By --open on a machine without one; it is served all the same."""
     served_on: list[int] = []
     monkeypatch.setattr("webbrowser.open", lambda _: False)
     monkeypatch.setattr(
         uvicorn.Server, "run", lambda _, sockets: served_on.append(sockets[0].close())
     )
-    serve(application(Game(FLOWN)), 8700, "/", True)
+    server.serve(application(Game(FLOWN)), 8700, "/", True)
 
     assert "--open: no browser was found here; open http://localhost:87" in capsys.readouterr().err
     assert len(served_on) == 1

@@ -9,9 +9,8 @@ import pytest
 
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.adapters.play import play
-from crosscheck2d.reports.game.messages import read_message
-from crosscheck2d.reports.game.pilot import SHIP
-from crosscheck2d.reports.game.session import Session
+from crosscheck2d.reports.game.flight import SHIP
+from crosscheck2d.reports.game.session import Session, read_message
 from crosscheck2d.scenarios.catalogue import SCENARIOS
 from crosscheck2d.scenarios.families.placing import lay_out
 from crosscheck2d.scenarios.model import Scenario
@@ -44,20 +43,16 @@ from crosscheck2d.scenarios.model import Scenario
     ],
 )
 def test_a_malformed_message_is_reported_in_a_sentence(text: str | bytes):
-    """ValueError and nothing else, whatever the text is."""
     with pytest.raises(ValueError, match=r"\w{3,}"):
         read_message(text)
 
 
 def test_saving_before_flying_is_reported():
-    """There is nothing to save."""
     with pytest.raises(ValueError, match="nothing has been flown"):
         Session(["reference:exercise"]).answer('{"do": "save"}')
 
 
 def test_another_scene_with_a_wrap_is_played_as_the_harness_plays_it():
-    """The earth, the way back to the start and "You won" belong to the exercise's field, not to
-    every wrap."""
     scene = lay_out(
         position=[[3.0, 1.5]],
         velocity=[[1.0, 0.0]],
@@ -80,8 +75,6 @@ def test_another_scene_with_a_wrap_is_played_as_the_harness_plays_it():
 
 
 def test_the_flame_is_against_a_thrust_that_turns_with_the_ship():
-    """In a replayed scene whose thrust is in the ship's own frame; the page draws what it is
-    sent."""
     whole = SCENARIOS["body_frame_thrust"]()
     session = Session(["reference:exercise"], whole)
     [thrust] = whole.thrusts

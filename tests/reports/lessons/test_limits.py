@@ -13,9 +13,8 @@ from crosscheck2d.reports.lessons import limits
 from crosscheck2d.reports.lessons.catalogue import LESSONS
 from crosscheck2d.reports.lessons.limits import HARSHNESS, SEEN, limits_of
 from crosscheck2d.reports.page.style import TRUTH
-from crosscheck2d.reports.stability import variants
 from crosscheck2d.reports.stability.cases import CASES
-from crosscheck2d.reports.stability.variants import DrivenEngine, play_as
+from crosscheck2d.reports.stability.limits import DRIVEN_ENGINES, DrivenEngine, play_as
 from tests.measured import MEASURED
 from tests.reports.stability.kept_limits import agrees, kept
 
@@ -56,7 +55,7 @@ def test_another_engine_has_another_bracket(monkeypatch: pytest.MonkeyPatch):
         patch.setattr(limits, "limits_of", limits_of.__wrapped__)
         patch.setattr(limits, "engines_of", lambda _: ["box2d:shipped"])
         patch.setitem(
-            variants.DRIVEN_ENGINES,
+            DRIVEN_ENGINES,
             "box2d:shipped",
             DrivenEngine("box2d:shipped", ENGINES["box2d:matched"].make),
         )

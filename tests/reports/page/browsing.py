@@ -46,7 +46,6 @@ def chromium() -> Iterator[Browser]:
 
 @contextmanager
 def served(app: Starlette) -> Iterator[str]:
-    """The address of `app`, served in a thread."""
     listening = taken_socket(0)
     server = uvicorn.Server(config_of(app))
     thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]}, daemon=True)
@@ -74,8 +73,6 @@ def opened(browser: Browser, url: str, **context: Any) -> tuple[Page, list[str]]
 
 
 def belongs(asked: str, url: str) -> bool:
-    """Whether what is asked for is of the page itself: its server's, the very file, or data within
-    it."""
     host = urlsplit(url).hostname
     if host is None:
         return asked.startswith(("data:", "blob:")) or asked.split("#")[0] == url.split("#")[0]
@@ -83,7 +80,6 @@ def belongs(asked: str, url: str) -> bool:
 
 
 def overhang(page: Page) -> int:
-    """By how many pixels the page is wider than the window."""
     return page.evaluate(
         "document.documentElement.scrollWidth - document.documentElement.clientWidth"
     )

@@ -23,7 +23,6 @@ def comparisons() -> list[Comparison]:
 
 @pytest.fixture(scope="package")
 def path(comparisons: list[Comparison], tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The page of these three."""
     path = tmp_path_factory.mktemp("out") / "latest" / "report.html"
     path.parent.mkdir()
     write_small(path, comparisons)

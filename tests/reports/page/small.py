@@ -12,7 +12,7 @@ from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.adapters.play import play
 from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.compare.comparison import Comparison, compare
-from crosscheck2d.reports.page.report_page import report_page
+from crosscheck2d.reports.page.report import report_page
 from crosscheck2d.reports.page.summary import summarize
 from crosscheck2d.scenarios.catalogue import scenario
 
@@ -42,7 +42,6 @@ def played(name: str, **changes: Any) -> Comparison:
 
 
 def write_small(path: Path, comparisons: list[Comparison], **more: Any) -> None:
-    """Write their page to `path`; `more` goes to `report_page`."""
     probe = {
         "engine": "pymunk",
         "profile": "matched",
@@ -75,7 +74,7 @@ def write_small(path: Path, comparisons: list[Comparison], **more: Any) -> None:
         path,
         summarize(comparisons),
         conformance=conformance,
-        known_answers=pd.DataFrame([known]),
+        known_answers=[known],
         about=about,
         **{"first": ["One.", HOSTILE, "Three."], **more},
     )

@@ -17,7 +17,7 @@ MARKS = {
     name.partition(":")[0]: row.mark for name, row in {**ENGINES, **FETCHED}.items() if row.mark
 } | {f"file {k}": mark for k, mark in enumerate(PALETTE)}
 PAGES = {"light": "#fdfdfb", "dark": "#14171a"}
-LEAST_CONTRAST, LEAST_DISTANCE = 3.0, 0.06
+LEAST_CONTRAST, LEAST_DISTANCE = 3.0, 0.06  # WCAG 2 asks 3 : 1 of graphics
 # What is seen, of linear RGB, without one kind of cones (Machado, Oliveira & Fernandes, IEEE TVCG
 # 15, 1291, 2009, table 1, severity 1.0).
 SEEN = {
@@ -62,13 +62,12 @@ TO_LAB = np.array(
 
 
 def linear(colour: str) -> Array:
-    """(3,) of #rrggbb."""
     stored = np.array([int(colour[k : k + 2], 16) for k in (1, 3, 5)]) / 255
     return np.where(stored <= 0.04045, stored / 12.92, ((stored + 0.055) / 1.055) ** 2.4)
 
 
 def contrast(one: str, other: str) -> float:
-    """Of WCAG 2."""
+    # Of WCAG 2.
     bright, dark = sorted(
         (linear(c) @ [0.2126, 0.7152, 0.0722] for c in (one, other)), reverse=True
     )
@@ -76,7 +75,6 @@ def contrast(one: str, other: str) -> float:
 
 
 def distance(one: str, other: str, seen: Array) -> float:
-    """Of two colours in OKLab, as somebody sees them."""
     first, second = (
         TO_LAB @ np.cbrt(TO_CONES @ np.clip(seen @ linear(c), 0, 1)) for c in (one, other)
     )
@@ -84,7 +82,6 @@ def distance(one: str, other: str, seen: Array) -> float:
 
 
 def close(marks: dict[str, Mark], page: str, seen: Array) -> dict[tuple[str, str], float]:
-    """The pairs whose colours are nearer to each other than `LEAST_DISTANCE`."""
     found = {
         (one, other): distance(getattr(marks[one], page), getattr(marks[other], page), seen)
         for one, other in combinations(marks, 2)
@@ -94,7 +91,6 @@ def close(marks: dict[str, Mark], page: str, seen: Array) -> dict[tuple[str, str
 
 @pytest.mark.parametrize("page", PAGES)
 def test_a_colour_stands_out_from_the_page(page: str):
-    """3 : 1, which WCAG 2 asks of graphics."""
     found = {name: contrast(getattr(mark, page), PAGES[page]) for name, mark in MARKS.items()}
 
     assert {name: ratio for name, ratio in found.items() if ratio < LEAST_CONTRAST} == {}
@@ -103,7 +99,6 @@ def test_a_colour_stands_out_from_the_page(page: str):
 @pytest.mark.parametrize("page", PAGES)
 @pytest.mark.parametrize("cones", SEEN)
 def test_two_engines_have_colours_that_everybody_can_tell_apart(cones: str, page: str):
-    """All engines with a colour in their row, also without one kind of cones."""
     marks = {name: mark for name, mark in MARKS.items() if not name.startswith("file")}
 
     assert close(marks, page, SEEN[cones]) == {}, (
@@ -112,8 +107,6 @@ def test_two_engines_have_colours_that_everybody_can_tell_apart(cones: str, page
 
 
 def free(marks: dict[str, Mark], page: str) -> str:
-    """The first colour of a grid that stands out from the page and that everybody can tell from
-    those of all marks."""
     taken = [getattr(mark, page) for mark in marks.values()]
     levels = range(0, 256, 51)
     return next(
@@ -129,7 +122,6 @@ def free(marks: dict[str, Mark], page: str) -> str:
 
 
 def test_a_free_colour_is_free():
-    """On both pages, beside all engines."""
     marks = {name: mark for name, mark in MARKS.items() if not name.startswith("file")}
     new = Mark(free(marks, "light"), free(marks, "dark"), "")
 
@@ -139,7 +131,6 @@ def test_a_free_colour_is_free():
 
 
 def test_a_row_has_no_mark_of_a_solvers_file_and_no_shape_of_another_engine():
-    """Nor a colour of `PALETTE`, fetched or not."""
     rows = {name: row for name, row in {**FETCHED, **ENGINES}.items() if row.mark}
     shapes = {(name.partition(":")[0], row.shape or row.mark.shape) for name, row in rows.items()}
     taken = Counter(shape for _, shape in shapes) + Counter(mark.shape for mark in PALETTE)
@@ -152,7 +143,6 @@ def test_a_row_has_no_mark_of_a_solvers_file_and_no_shape_of_another_engine():
 
 
 def test_two_colours_that_some_take_for_one_are_noticed():
-    """The control: red and olive, of one brightness, without red cones."""
     marks = {"red": Mark("#c80000", "#c80000", "circle"), "olive": Mark("#4d4400", "#4d4400", "x")}
 
     assert close(marks, "light", SEEN["all cones"]) == {}

@@ -26,13 +26,11 @@ LINKS = {"game": "", "lesson": ""}
 
 
 def short(path: Path) -> str:
-    """Its name below `reports`, as templates name each other."""
     return path.relative_to(REPORTS).as_posix()
 
 
 @pytest.mark.parametrize("path", TEMPLATES, ids=short)
 def test_every_page_extends_the_base_and_only_the_base_has_a_head(path: Path):
-    """So that charset, policy, colours and scripts are written once."""
     text = path.read_text(encoding="utf-8")
 
     assert text.startswith(f'{{% extends "{BASE}" %}}') == (short(path) not in PARTS)
@@ -40,7 +38,6 @@ def test_every_page_extends_the_base_and_only_the_base_has_a_head(path: Path):
 
 
 def test_no_macro_is_defined_twice():
-    """What two pages need is in kit_parts.html.j2."""
     defined = [
         name
         for path in TEMPLATES
@@ -51,7 +48,6 @@ def test_no_macro_is_defined_twice():
 
 
 def test_templates_are_read_in_one_place():
-    """jinja2 is imported by documents.py and by no other file of the reports."""
     users = []
     for path in REPORTS.rglob("*.py"):
         imports = [
@@ -65,7 +61,6 @@ def test_templates_are_read_in_one_place():
 
 
 def test_text_is_escaped_and_a_name_that_nobody_gave_is_an_error():
-    """Both hold for pages and for parts of them."""
     name = "<b>engine</b>:shipped"
     page = render(
         "lessons/index.html.j2",

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from crosscheck2d.adapters.engines import row_of
 from crosscheck2d.adapters.play import play
-from crosscheck2d.reports.commands.medians import medians
+from crosscheck2d.reports.commands.run import medians
 from crosscheck2d.reports.compare.comparison import Comparison, compare
 from crosscheck2d.reports.compare.pareto import cost_to_reach
 from crosscheck2d.reports.compare.pooling import middle_half
@@ -67,9 +67,11 @@ def test_no_solver_whose_disk_is_through_the_floor_is_nearest(name: str):
 
 
 def test_a_scene_without_an_exact_answer_is_judged_too():
-    stack = compared("disk_onto_two", "reference:lesson", "pymunk:matched")
-    [scene] = scenes_of([stack])
+    names = ("reference:lesson", "pymunk:shipped", "pymunk:matched")
+    summary = summarize([compared("disk_onto_two", *names)])
+    [scene] = summary.scenes
     assert not scene.counts
     assert np.isinf(scene.error("reference:lesson"))
     assert np.isnan(scene.error("pymunk:matched"))
-    assert any("reference:lesson" in said for said in findings(summarize([stack])))
+    assert any("reference:lesson" in sentence for sentence in findings(summary))
+    assert summary.libraries == ["pymunk:matched"]  # though no scene decides between the two

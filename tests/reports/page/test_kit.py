@@ -22,7 +22,6 @@ NAMES = ("pymunk:shipped", "reference:exercise")
 
 
 def some_chart() -> kit.Chart:
-    """Two engines, and a hostile title."""
     figure, axes = new_figure()
     lines = [Line(name, [10.0, 100.0], [1.0, 0.1], name, filled=0) for name in NAMES]
     draw_lines(axes, lines, "time", "error", x_unit="µs")
@@ -30,7 +29,6 @@ def some_chart() -> kit.Chart:
 
 
 def some_replay() -> kit.Playback:
-    """Two engines over the exact answer."""
     scene = scenario("oblique_e09")
     dt = scene.dt(scene.middle_substeps)
     runs = [play(ENGINES[name].make(), name, scene, dt) for name in NAMES]
@@ -41,7 +39,6 @@ def some_replay() -> kit.Playback:
 
 @pytest.fixture(scope="module")
 def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A page with a part of each kind."""
     cell = kit.TableCell(
         0.5, HOSTILE, css="best", side="3 µs", notes=(kit.TableCell("sinks", link="#a_b"),)
     )
@@ -59,7 +56,6 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_row_opens_by_click_by_key_and_by_address(browser: Browser, path: Path):
-    """So does a fold; nothing is asked of outside, and hostile text is inert."""
     page, heard = opened(browser, path.as_uri())
     row = page.locator("tr.opened")
     button = page.get_by_role("button", name="a b")
@@ -83,14 +79,12 @@ def test_a_row_opens_by_click_by_key_and_by_address(browser: Browser, path: Path
 
 
 def drawn_colour(page: Page) -> str:
-    """The colour of a line."""
     return page.locator("figure.chart path[style*='fill: none']").last.evaluate(
         "path => getComputedStyle(path).stroke"
     )
 
 
 def test_colours_of_a_chart_follow_the_page_and_its_text_stays_text(browser: Browser, path: Path):
-    """A chart needs no second picture for the night."""
     page, _ = opened(browser, path.as_uri(), color_scheme="light")
     light = drawn_colour(page)
     page.emulate_media(color_scheme="dark")
@@ -103,7 +97,6 @@ def test_colours_of_a_chart_follow_the_page_and_its_text_stays_text(browser: Bro
 
 
 def test_nothing_runs_over_at_400_px_nor_on_paper(browser: Browser, path: Path):
-    """Tables and charts scroll in themselves."""
     page, _ = opened(browser, path.as_uri(), viewport={"width": 400, "height": 800})
     narrow = overhang(page)
     page.emulate_media(media="print")
@@ -115,7 +108,6 @@ def test_nothing_runs_over_at_400_px_nor_on_paper(browser: Browser, path: Path):
 
 
 def test_a_cell_covers_columns_and_a_row_is_a_group_once():
-    """What a template walks over."""
     frame = pd.DataFrame([[kit.TableCell("all", span=2), "", 3]], ["a"], dtype=object)
     [(group, label, cells)] = kit.Table(frame, ["G"]).rows
 

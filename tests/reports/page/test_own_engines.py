@@ -16,7 +16,7 @@ from crosscheck2d.adapters.conformance.probe import Departure
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.adapters.host.engine import TEMPLATES, row_of_file
 from crosscheck2d.adapters.host.process import processes_reused
-from crosscheck2d.reports.page.own_engines import WORDS, is_lawless, own_engine_sentences
+from crosscheck2d.reports.page.findings import WORDS, is_lawless, own_engine_sentences
 from tests.reports.terminal.command_line import crosscheck
 
 PROBES = (*LAWS, "order_and_shapes", "load_forgets", "static_stays", "pair_momentum")
@@ -175,7 +175,6 @@ def written(folder: Path, text: str, changes: list[Change]) -> Path:
 
 
 def probed(path: Path, *probes: str) -> list[dict[str, Any]]:
-    """The findings of the probes on a file, as rows."""
     row = row_of_file(path)
     with processes_reused():
         return [asdict(ask(path.name, "own", probe, row)) for probe in probes or PROBES]
@@ -184,7 +183,6 @@ def probed(path: Path, *probes: str) -> list[dict[str, Any]]:
 @pytest.mark.slow
 @pytest.mark.parametrize("fault", FAULTS)
 def test_the_sentence_of_an_engine_begins_with_its_fault(fault: str, tmp_path: Path):
-    """One fault each, as in the codes of strangers."""
     text, changes, words = FAULTS[fault]
     findings = probed(written(tmp_path, text, changes))
     [sentence] = own_engine_sentences(findings)
@@ -197,7 +195,6 @@ def test_the_sentence_of_an_engine_begins_with_its_fault(fault: str, tmp_path: P
 @pytest.mark.slow
 @pytest.mark.parametrize("name", RIGHT)
 def test_a_right_engine_breaks_no_law(name: str, tmp_path: Path):
-    """In either order of updates, and in float32."""
     findings = probed(written(tmp_path, *RIGHT[name]))
 
     assert not is_lawless(findings)
@@ -206,7 +203,6 @@ def test_a_right_engine_breaks_no_law(name: str, tmp_path: Path):
 
 @pytest.mark.slow
 def test_a_threshold_is_named_and_breaks_no_law(tmp_path: Path):
-    """It is a property of the engine."""
     path = written(tmp_path, *RIGHT["a threshold of 1 m/s"])
     findings = probed(path, *(f"restitution_{v:g}" for v in (0.1, 0.5, 2.0)), "pair_keeps_e")
 
@@ -218,7 +214,7 @@ def test_a_threshold_is_named_and_breaks_no_law(tmp_path: Path):
 
 @pytest.mark.slow
 def test_an_engine_for_boxes_breaks_no_law_and_is_told_of_single_walls(tmp_path: Path):
-    """Its bounds are the outermost coordinates of the walls."""
+    # Its bounds are the outermost coordinates of the walls.
     bounds = (
         "walls.forEach((wall, w) => collide(world, a, nearest(wall, a), -1 - w))",
         "[['x', 'u', 0], ['y', 'v', 1]].forEach(([x, u, k]) => { const c = walls.flat().map((p) =>"
@@ -235,7 +231,6 @@ def test_an_engine_for_boxes_breaks_no_law_and_is_told_of_single_walls(tmp_path:
 
 @pytest.mark.slow
 def test_what_a_file_refuses_is_not_asked_and_named(tmp_path: Path):
-    """What it plays is asked all the same."""
     assert own_engine_sentences(probed(written(tmp_path, BARE, []))) == [
         "mine.js keeps the laws that were asked. Not asked, because it refuses them: walls and"
         " static disks."
@@ -243,12 +238,10 @@ def test_what_a_file_refuses_is_not_asked_and_named(tmp_path: Path):
 
 
 def test_each_law_has_its_words():
-    """And no words are left over."""
     assert set(WORDS) == set(Departure)
 
 
 def test_a_library_departs_by_its_defaults_and_stays_ranked():
-    """Its departures are documented, in tests/tolerances.py."""
     findings = [
         asdict(ask("pymunk", "shipped", probe, ENGINES["pymunk:shipped"])) for probe in LAWS
     ]
@@ -263,7 +256,6 @@ def test_a_library_departs_by_its_defaults_and_stays_ranked():
 
 @pytest.mark.slow
 def test_terminal_and_page_begin_with_the_fault_and_do_not_rank_it(tmp_path: Path):
-    """Where nothing falls it is as right as the others."""
     text, changes, words = FAULTS["gravity upside down"]
     written(tmp_path, text, changes)
     run = crosscheck(

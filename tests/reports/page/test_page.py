@@ -15,7 +15,7 @@ from playwright.sync_api import Browser, Page
 from crosscheck2d.adapters.engines import ENGINES, FETCHED
 from crosscheck2d.reports.compare.comparison import Comparison
 from crosscheck2d.reports.page.replay import GRID
-from crosscheck2d.reports.page.report_page import report_page
+from crosscheck2d.reports.page.report import report_page
 from crosscheck2d.reports.page.summary import summarize
 from tests.reports.page.browsing import opened, overhang
 from tests.reports.page.small import ASTEROIDS, HEAD_ON, HOSTILE, ORBIT, PLAYED, write_small
@@ -27,7 +27,6 @@ SCENES = 55  # of a whole run
 
 @pytest.fixture(scope="module")
 def desktop(browser: Browser, path: Path) -> Iterator[tuple[Page, list[str]]]:
-    """The page at 1280 px, opened once: that takes two seconds."""
     page, heard = opened(browser, path.as_uri(), viewport=SCREEN)
     yield page, heard
     page.context.close()
@@ -47,14 +46,12 @@ def page(desktop: tuple[Page, list[str]]) -> Iterator[Page]:
 
 
 def open_scene(page: Page, name: str) -> None:
-    """Open a scene by its address, and wait until it is drawn."""
     page.evaluate("name => { location.hash = name; }", name)
     page.wait_for_function("name => players[name]", arg=name)
     page.locator(f"#{name} + tr.opened canvas").first.wait_for()
 
 
 def test_a_scene_opens_below_its_row_at_the_first_visible_difference(page: Page):
-    """An engine has a picture while it is ticked."""
     page.get_by_role("button", name=HEAD_ON.replace("_", " ")).click()
     row = page.locator(f"#{HEAD_ON} + tr.opened")
     row.locator("canvas").first.wait_for()
@@ -68,7 +65,6 @@ def test_a_scene_opens_below_its_row_at_the_first_visible_difference(page: Page)
 
 @pytest.mark.parametrize("name", [HEAD_ON, pytest.param(ASTEROIDS, marks=pytest.mark.slow)])
 def test_the_replay_shows_the_trajectory(page: Page, comparisons: list[Comparison], name: str):
-    """At the packed instants positions are those of the run, to half a step of the grid."""
     open_scene(page, name)
     comparison = next(each for each in comparisons if each.scenario.name == name)
     instants = np.array(page.evaluate("name => players[name].pack.t", name))
@@ -88,7 +84,6 @@ def test_the_replay_shows_the_trajectory(page: Page, comparisons: list[Compariso
 
 
 def test_the_truth_is_not_drawn_beyond_its_horizon(page: Page):
-    """The words and the picture end together."""
     open_scene(page, ORBIT)
     past = "p => { players[p].seek(players[p].until); return players[p].positions('truth'); }"
 
@@ -98,7 +93,6 @@ def test_the_truth_is_not_drawn_beyond_its_horizon(page: Page):
 
 
 def test_a_scene_is_opened_and_played_by_keyboard_alone(page: Page):
-    """Tab to its button, Enter, Tab into the replay, space and arrows."""
     page.get_by_role("button", name=HEAD_ON.replace("_", " ")).focus()
     page.keyboard.press("Enter")
     page.wait_for_function("name => document.querySelector('tr.opened canvas')", arg=HEAD_ON)
@@ -118,7 +112,6 @@ def test_a_scene_is_opened_and_played_by_keyboard_alone(page: Page):
 
 
 def test_text_from_files_is_inert(page: Page):
-    """Also in what is packed."""
     for name in (HEAD_ON, ORBIT, ASTEROIDS):
         open_scene(page, name)
 
@@ -127,7 +120,6 @@ def test_text_from_files_is_inert(page: Page):
 
 
 def test_failed_and_refused_runs_are_in_sight(page: Page):
-    """In the map by title, and beside the scene with the reason."""
     titles = page.locator("#scenes td.g5[title*='box2d_v3']").count()
     open_scene(page, ORBIT)
 
@@ -136,7 +128,6 @@ def test_failed_and_refused_runs_are_in_sight(page: Page):
 
 
 def test_a_word_of_the_table_opens_its_worst_scene(page: Page):
-    """By its address."""
     link = page.locator("table.main a.note").first
     name = str(link.get_attribute("href")).removeprefix("#")
     link.click()
@@ -144,13 +135,11 @@ def test_a_word_of_the_table_opens_its_worst_scene(page: Page):
 
 
 def test_a_click_on_a_library_opens_its_settings(page: Page):
-    """Though both the section and its part are folded."""
     page.locator("table.main thead a", has_text="pymunk").click()
     page.locator("#settings_pymunk pre").wait_for()
 
 
 def test_every_titled_section_is_one_click_from_the_first_screen(page: Page):
-    """Also the folded ones; a click opens them."""
     links = page.locator("nav a[href^='#']")
     titles = links.all_inner_texts()
     links.filter(has_text="How far to trust this").click()
@@ -161,7 +150,6 @@ def test_every_titled_section_is_one_click_from_the_first_screen(page: Page):
 
 @pytest.mark.slow
 def test_the_page_never_scrolls_sideways(browser: Browser, path: Path):
-    """Narrow, wide or on paper, with all of it open, however long a word is."""
     page, heard = opened(browser, path.as_uri(), viewport={"width": 400, "height": 800})
     for name in (HEAD_ON, ORBIT, ASTEROIDS):
         open_scene(page, name)
@@ -182,7 +170,6 @@ def test_the_page_never_scrolls_sideways(browser: Browser, path: Path):
 def test_a_run_of_one_scene_begins_with_its_replay_and_has_nothing_pooled(
     browser: Browser, comparisons: list[Comparison], tmp_path: Path
 ):
-    """And its table: an engine a row, an error for each step size."""
     write_small(tmp_path / "r.html", comparisons[:1])
     page, heard = opened(browser, (tmp_path / "r.html").as_uri(), viewport=SCREEN)
     page.locator("canvas").first.wait_for()
@@ -198,7 +185,6 @@ def test_a_run_of_one_scene_begins_with_its_replay_and_has_nothing_pooled(
 
 
 def as_all_engines(comparison: Comparison, name: str, engines: Iterable[str]) -> Comparison:
-    """The comparison under another name, what one engine played given to all."""
     scenario = replace(comparison.scenario, name=name, asks="A question that fills a line of it?")
     mine = [run for run in comparison.runs if run.name == PLAYED[0]]
     table = comparison.table
@@ -213,7 +199,6 @@ def as_all_engines(comparison: Comparison, name: str, engines: Iterable[str]) ->
 def test_a_whole_run_is_few_screens_few_bytes_and_two_sheets(
     browser: Browser, comparisons: list[Comparison], tmp_path: Path
 ):
-    """As many scenes and engines as there are; the first table ends on the first screen."""
     engines = [*ENGINES, *FETCHED]
     names = [f"scene_of_a_long_name_{k}" for k in range(SCENES)]
     many = [as_all_engines(comparisons[k % 2], name, engines) for k, name in enumerate(names)]
@@ -232,15 +217,13 @@ def test_a_whole_run_is_few_screens_few_bytes_and_two_sheets(
 
 
 def test_a_page_of_nothing_can_be_written(tmp_path: Path):
-    """Without scenarios, probes and known answers there is still a page, with its command."""
     about = {"command": "crosscheck run nothing", "machine": {}, "versions": {}, "unfinished": ""}
-    nothing = pd.DataFrame()
     page = report_page(
         tmp_path / "r.html",
         summarize([]),
         first=[],
-        conformance=nothing,
-        known_answers=nothing,
+        conformance=pd.DataFrame(),
+        known_answers=[],
         about=about,
     )
 
@@ -248,7 +231,6 @@ def test_a_page_of_nothing_can_be_written(tmp_path: Path):
 
 
 def test_the_readers_own_sentences_come_first(path: Path):
-    """Before any other, in the order given."""
     html = path.read_text(encoding="utf-8")
     lead = re.findall(r'<p class="lead">(.*?)</p>', html)
 
@@ -258,8 +240,6 @@ def test_the_readers_own_sentences_come_first(path: Path):
 
 @pytest.mark.slow
 def test_the_browser_of_these_tests_hears_what_a_page_asks_for(browser: Browser, tmp_path: Path):
-    """A page that asks for another file, for another machine, and complains: all three are heard,
-    data is not."""
     path = tmp_path / "asks.html"
     own = "data:image/gif;base64,R0lGODlhAQABAAAAACwAAAAAAQABAAAC"
     images = f"<img src=other.png><img src=http://elsewhere.invalid/a.png><img src={own}>"

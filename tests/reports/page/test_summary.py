@@ -11,7 +11,6 @@ import pytest
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.adapters.play import play
 from crosscheck2d.reports.compare.comparison import Comparison, compare
-from crosscheck2d.reports.page.cost_points import RunTimes
 from crosscheck2d.reports.page.findings import ranked
 from crosscheck2d.reports.page.scene_map import map_section
 from crosscheck2d.reports.page.scenes import ANGLE, scenes_of
@@ -25,7 +24,7 @@ from crosscheck2d.reports.page.situations import (
     STACKS,
     situations_of,
 )
-from crosscheck2d.reports.page.summary import WITHOUT, Summary, summarize
+from crosscheck2d.reports.page.summary import WITHOUT, RunTimes, Summary, summarize
 from crosscheck2d.reports.page.trade_offs import cost_against_size, error_against_cost, limits
 from crosscheck2d.reports.run.timing import noise_of
 from crosscheck2d.scenarios.catalogue import SCENARIOS, scenario
@@ -46,7 +45,6 @@ WHERE = {
 
 
 def played(name: str) -> Comparison:
-    """A scene through all `NAMES`, and the reference with friction where there is some."""
     one = replace(scenario(name), substeps=scenario(name).substeps[1:3])
     names = [*NAMES, *["reference:coulomb"] * bool(one.scene.friction)]
     dts = [one.dt(k) for k in one.substeps]
@@ -55,19 +53,16 @@ def played(name: str) -> Comparison:
 
 @pytest.fixture(scope="module")
 def comparisons() -> list[Comparison]:
-    """Four scenes of four situations."""
     return [played(name) for name in SCENES]
 
 
 @pytest.fixture(scope="module")
 def summary(comparisons: list[Comparison]) -> Summary:
-    """Of these four, without times."""
     return summarize(comparisons)
 
 
 @pytest.mark.parametrize("name", WHERE)
 def test_a_scene_belongs_where_its_answer_says(name: str):
-    """By what collides with what in the exact answer, weight, and what turns."""
     scene = scenario(name)
     assert scene.truth is not None
     kinds = situations_of(scene, scene.truth(scene.times))
@@ -77,13 +72,11 @@ def test_a_scene_belongs_where_its_answer_says(name: str):
 
 
 def test_without_an_answer_all_disks_may_meet():
-    """Twenty disks are then a crowd, two are not."""
     assert situations_of(scenario("gas_of_100"), None)[0] == CROWDS
     assert situations_of(scenario("head_on_equal_e1"), None)[0] == SINGLE
 
 
 def test_an_engine_that_orders_collisions_is_ranked_apart_whatever_was_played():
-    """That it does is said in its row, and not read off errors."""
     names = ["pymunk:matched", "reference:exercise", "reference:ordered", "event_driven:float64"]
 
     assert ranked(Summary([], ["a.js:own", *names])) == names[:2]
@@ -91,8 +84,6 @@ def test_an_engine_that_orders_collisions_is_ranked_apart_whatever_was_played():
 
 
 def test_a_library_has_one_profile_the_nearer_in_more_scenes(summary: Summary):
-    """In slow_collision Box2D as shipped does not bounce; where the others are nearer by more than
-    a factor of two, the cell says so."""
     assert summary.chosen["box2d"][0] == "box2d:matched"
     assert summary.libraries == ["pymunk:matched", "box2d:matched"]
     only = summarize([s.comparison for s in summary.scenes if s.name == "slow_collision"])
@@ -101,14 +92,12 @@ def test_a_library_has_one_profile_the_nearer_in_more_scenes(summary: Summary):
 
 
 def test_within_a_factor_of_two_is_a_tie_and_ours_are_never_nearest(summary: Summary):
-    """In free fall all err alike."""
     assert all(summary.is_near(name, FLIGHT) for name in summary.libraries)
     assert not summary.is_near("reference:exercise", FLIGHT)
     assert summary.cell("reference:ordered", FLIGHT).text == "exact"
 
 
 def test_an_error_that_doubles_and_a_bit_ends_the_tie(comparisons: list[Comparison]):
-    """The control of the tie."""
     table = comparisons[0].table.copy()
     worse = (table.engine == "box2d") & (table.metric == "position_max_radii")
     table.loc[worse, "value"] *= 2.1
@@ -119,7 +108,6 @@ def test_an_error_that_doubles_and_a_bit_ends_the_tie(comparisons: list[Comparis
 
 
 def test_failing_one_more_scene_never_lowers_a_median(comparisons: list[Comparison]):
-    """A run that fails a verdict is infinitely far off."""
     table = comparisons[1].table.copy()
     mine = (table.engine == "pymunk") & (table.metric == "momentum")
     assert mine.any()
@@ -134,7 +122,6 @@ def test_failing_one_more_scene_never_lowers_a_median(comparisons: list[Comparis
 
 
 def test_the_last_row_counts_the_scenes_that_the_rows_and_the_sentence_count(summary: Summary):
-    """A scene is lost where an engine fails or is a radius off, once."""
     for name in ("box2d:shipped", "pymunk:matched"):
         lost = [s.name for s in summary.situations[WITHOUT] if s.is_lost(name)]
         words = [note.text for note in summary.words(name, WITHOUT)]
@@ -145,7 +132,6 @@ def test_the_last_row_counts_the_scenes_that_the_rows_and_the_sentence_count(sum
 
 
 def test_scenes_with_friction_count_in_their_own_row_only(summary: Summary):
-    """There the reference that has friction stands for the exercise, which refuses them."""
     assert [scene.name for scene in summary.situations[FRICTION]] == [SCENES[-1]]
     assert SCENES[-1] not in [scene.name for scene in summary.situations[WITHOUT]]
     assert np.isfinite(summary.error("reference:exercise", FRICTION))
@@ -153,7 +139,6 @@ def test_scenes_with_friction_count_in_their_own_row_only(summary: Summary):
 
 
 def test_spin_is_judged_by_the_angle(summary: Summary):
-    """Of the same scenes, which also count above."""
     scene = summary.situations[SPIN][0]
     errors = [s.error("pymunk:matched", metric=ANGLE) for s in summary.situations[SPIN]]
 
@@ -162,7 +147,6 @@ def test_spin_is_judged_by_the_angle(summary: Summary):
 
 
 def test_three_sentences_say_what_the_table_says(summary: Summary):
-    """Names, counts and the link to the settings are computed."""
     first, *rest = (str(sentence) for sentence in summary.sentences())
     near = summary.nearest(WITHOUT)
 
@@ -173,7 +157,6 @@ def test_three_sentences_say_what_the_table_says(summary: Summary):
 
 
 def test_who_breaks_the_protocol_is_not_ranked(comparisons: list[Comparison]):
-    """It has no column; in the map it stays."""
     summary = summarize(comparisons, {"pymunk:shipped", "pymunk:matched"})
     [table] = map_section(summary).parts
 
@@ -183,7 +166,6 @@ def test_who_breaks_the_protocol_is_not_ranked(comparisons: list[Comparison]):
 
 
 def times(comparisons: list[Comparison], pairs: list[float]) -> RunTimes:
-    """Made-up times: each engine needs as many µs for a second as there are steps in it."""
     rows = [
         {
             "scenario": run.scenario,
@@ -202,7 +184,6 @@ def times(comparisons: list[Comparison], pairs: list[float]) -> RunTimes:
 def test_a_cost_is_that_of_a_step_and_stands_only_where_times_can_be_trusted(
     comparisons: list[Comparison],
 ):
-    """A busy machine is named in its place, and the chart then counts steps."""
     quiet = summarize(comparisons, clock=times(comparisons, [1.0, 1.01]))
     busy = summarize(comparisons, clock=times(comparisons, [1.0, 9.0]))
 
@@ -217,7 +198,6 @@ def test_a_cost_is_that_of_a_step_and_stands_only_where_times_can_be_trusted(
 
 
 def test_limits_are_the_kept_ones_and_equal_cells_are_one(summary: Summary):
-    """Of pymunk a column of four stands; far apart settings are named."""
     section = limits(summary)
     assert section is not None
     [table] = section.parts
@@ -234,7 +214,6 @@ def test_limits_are_the_kept_ones_and_equal_cells_are_one(summary: Summary):
 
 
 def test_the_chart_of_sizes_has_every_kept_engine_of_the_table(summary: Summary):
-    """By its label."""
     section = cost_against_size(summary)
     assert section is not None
 
@@ -243,7 +222,6 @@ def test_the_chart_of_sizes_has_every_kept_engine_of_the_table(summary: Summary)
 
 
 def test_every_situation_has_a_scene_in_the_catalogue():
-    """So that the table of a whole run has every row."""
     kinds = {
         kind
         for one in map(scenario, SCENARIOS)
@@ -254,7 +232,6 @@ def test_every_situation_has_a_scene_in_the_catalogue():
 
 
 def test_the_farthest_engine_that_is_ticked_can_be_seen(summary: Summary):
-    """In the packed facts of a scene: at most three, ours first, the nearest library named."""
     [scene] = [s for s in scenes_of([summary.scenes[2].comparison])]
     from crosscheck2d.reports.page.scene_map import to_tick
 

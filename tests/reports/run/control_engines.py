@@ -8,6 +8,8 @@ import os
 import signal
 import sys
 import time
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -16,18 +18,29 @@ from crosscheck2d.adapters.engine_row import EngineRow
 from crosscheck2d.scenarios.model import State
 
 FATAL = 100  # the step
-SLOW = 4.0  # s
+SLOW = 4.0  # s, longer than the time-out that a test gives an engine that loads slowly
+
+
+def nothing() -> None:
+    pass
 
 
 class Controlled:
-    """Disks that fly straight through everything, and `misbehave` when the 100th step is due.
+    """Disks that fly straight through everything, with what happens when the 100th step is due, and
+    when a scene is loaded.
 
     It is plain numpy, so that a worker that has to be replaced is soon there again.
     """
 
+    def __init__(
+        self, misbehave: Callable[[], object] = nothing, in_load: Callable[[], object] = nothing
+    ) -> None:
+        self.misbehave, self.in_load = misbehave, in_load
+
     def load(self, scene, dt):
         self.dt, self.steps, self.start = dt, 0, scene
         self.position, self.velocity = np.array(scene.position), np.array(scene.velocity)
+        self.in_load()
 
     def apply_force(self, disk, force, torque):
         pass
@@ -39,16 +52,9 @@ class Controlled:
             self.position += self.velocity * self.dt
             self.steps += 1
 
-    def misbehave(self):
-        """Nothing: the control of the controls."""
-
     def read(self):
-        return State(
-            self.position.copy(),
-            self.velocity.copy(),
-            self.start.angle,
-            self.start.angular_velocity,
-        )
+        angle, spin = self.start.angle, self.start.angular_velocity
+        return State(self.position.copy(), self.velocity.copy(), angle, spin)
 
     def collisions(self):
         return []
@@ -63,95 +69,9 @@ class Controlled:
         pass
 
 
-class Raises(Controlled):
-    """As a binding does that is older than its library."""
-
-    def misbehave(self):
-        raise RuntimeError("no such luck")
-
-
-class Aborts(Controlled):
-    """As pymunk does on a negative mass: a line on standard error, then abort() in C."""
-
-    def misbehave(self):
-        os.write(2, b"assertion failed: mass > 0\n")
-        ctypes.CDLL(None).abort()
-
-
-class Segfaults(Controlled):
-    """As Box2D 3 does on a body that is gone."""
-
-    def misbehave(self):
-        ctypes.string_at(0)
-
-
-class Hangs(Controlled):
-    """In C, where no Python signal handler runs."""
-
-    def misbehave(self):
-        ctypes.CDLL(None).sleep(1000)
-
-
-class Devours(Controlled):
-    """Allocates without end."""
-
-    def misbehave(self):
-        taken = []
-        while True:
-            taken.append(np.ones(1_000_000))
-
-
 class TurnsToNan(Controlled):
-    """Without a word."""
-
-    def misbehave(self):
-        self.velocity[0] = np.nan
-
-
-class Prints(Controlled):
-    """20 MB to each stream."""
-
-    def misbehave(self):
-        for _ in range(20):
-            sys.stdout.write("x" * 999_999 + "\n")
-            sys.stderr.write("y" * 999_999 + "\n")
-
-
-class Leaves(Controlled):
-    """Ends the process as if all were well."""
-
-    def misbehave(self):
-        os._exit(0)
-
-
-class IsKilled(Controlled):
-    """By `kill -9`, every time."""
-
-    def misbehave(self):
-        os.kill(os.getpid(), signal.SIGKILL)
-
-
-class LoadsSlowly(Controlled):
-    """As one that is compiled first: longer than the time-out that its test gives it."""
-
-    def load(self, scene, dt):
-        time.sleep(SLOW)
-        super().load(scene, dt)
-
-
-class LoadsSlowlyAndHangs(LoadsSlowly):
-    """The control of the one before."""
-
-    def misbehave(self):
-        time.sleep(1000)
-
-
-class HangsInLoad(Controlled):
-    """Before its first step is due."""
-
-    def load(self, scene, dt):
-        super().load(scene, dt)
-        ctypes.CDLL(None).sleep(1000)
+    def __init__(self):
+        super().__init__(lambda: np.copyto(self.velocity[0], np.nan))
 
 
 class Remembers(Controlled):
@@ -165,23 +85,58 @@ class Remembers(Controlled):
         self.velocity *= Remembers.worlds
 
 
-class Once(Controlled):
-    """Killed by `kill -9` the first time only: where it is asked to, it leaves a mark that it has
-    been here."""
-
-    def misbehave(self):
-        mark = Path(os.environ["CONTROL_MARK"])
-        if not mark.exists():
-            mark.touch()
-            os.kill(os.getpid(), signal.SIGKILL)
+def raises():
+    raise RuntimeError("no such luck")
 
 
-def row(make: type[Controlled], leaves_state: bool = False) -> EngineRow:
+def aborts():
+    os.write(2, b"assertion failed: mass > 0\n")  # as pymunk does on a negative mass
+    ctypes.CDLL(None).abort()
+
+
+def segfaults():
+    ctypes.string_at(0)
+
+
+def hangs():
+    ctypes.CDLL(None).sleep(1000)  # in C, where no Python signal handler runs
+
+
+def devours():
+    taken = []
+    while True:
+        taken.append(np.ones(1_000_000))
+
+
+def prints():
+    for _ in range(20):
+        sys.stdout.write("x" * 999_999 + "\n")
+        sys.stderr.write("y" * 999_999 + "\n")
+
+
+def leaves():
+    os._exit(0)  # as if all were well
+
+
+def is_killed():
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def is_killed_once():
+    mark = Path(os.environ["CONTROL_MARK"])
+    if not mark.exists():
+        mark.touch()
+        is_killed()
+
+
+loads_slowly = partial(time.sleep, SLOW)
+
+
+def row(make: Callable[[], Controlled], leaves_state: bool = False) -> EngineRow:
     """As a row of `ENGINES`."""
     return EngineRow(make, "a control", alpha=0.5, rounding=2.0**-53, leaves_state=leaves_state)
 
 
-CONTROLS = {
-    f"{make.__name__.lower()}:control": row(make)
-    for make in (Raises, Aborts, Segfaults, Hangs, Devours, TurnsToNan, Prints, Leaves, IsKilled)
-}
+FAULTS = (raises, aborts, segfaults, hangs, devours, prints, leaves, is_killed)
+CONTROLS = {f"{fault.__name__}:control": row(partial(Controlled, fault)) for fault in FAULTS}
+CONTROLS["turns_to_nan:control"] = row(TurnsToNan)

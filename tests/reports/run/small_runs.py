@@ -6,9 +6,9 @@ from pathlib import Path
 
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.reports.run import suite
-from crosscheck2d.reports.run.plan import Means, RunPlan
 from crosscheck2d.reports.run.results import COMMAND, RunResults
 from crosscheck2d.reports.run.store import reading, writing
+from crosscheck2d.reports.run.suite import Means, RunPlan
 from crosscheck2d.reports.terminal.progress import Progress
 from crosscheck2d.scenarios.rows import Rows
 
@@ -23,36 +23,29 @@ SMALL = [
     "--engine",
     "pymunk",
 ]
-LONG = ["run", "asteroids", "gas_of_100", "--timings", "0"]  # 48 cells, of 0.1 s or more
-LONG += [
-    word
-    for name in ("reference:exercise", "reference:lesson", "pymunk", "box2d")
-    for word in ("--engine", name)
-]
+# 48 cells, of 0.1 s or more
+LONG = "run asteroids gas_of_100 --timings 0 --engine reference:exercise --engine reference:lesson"
+LONG = [*LONG.split(), "--engine", "pymunk", "--engine", "box2d"]
 
 
 def plan_of(scene_file: Path, timings: float = 0.0) -> RunPlan:
-    """The plan of the small run."""
     rows = {name: ENGINES[name] for name in PLAYED}
     scenes = ["slow_collision", str(scene_file)]
     return RunPlan(scenes, rows, 0, [], False, timings, "made by a test")
 
 
 def make(folder: Path, scene_file: Path, timings: float = 0.0) -> Path:
-    """Its folder, with all rows and no tables."""
     with writing(folder, COMMAND) as store, Progress() as progress:
         suite.carry_out(plan_of(scene_file, timings), Means(2), store, progress)
     return folder
 
 
 def read(folder: Path) -> RunResults:
-    """The results in a folder; the file of its rows is closed, and so no trajectory can be read."""
     with reading(folder, COMMAND) as store:
         return RunResults.read(store)
 
 
 def cells_in(folder: Path) -> int:
-    """How many cells have a row, while another process writes."""
     try:
         with closing(Rows(folder / "results.sqlite", writing=False)) as rows:
             return len(rows.keys("cell"))

@@ -12,11 +12,10 @@ import pytest
 from crosscheck2d.adapters.engines import ENGINES, UNASKED, told_apart
 from crosscheck2d.adapters.play import play_once
 from crosscheck2d.reports.run import bits
-from crosscheck2d.reports.run.plan import Means, RunPlan
 from crosscheck2d.reports.run.results import COMMAND, RunResults
 from crosscheck2d.reports.run.scenes import open_scene
 from crosscheck2d.reports.run.store import reading, writing
-from crosscheck2d.reports.run.suite import carry_out
+from crosscheck2d.reports.run.suite import Means, RunPlan, carry_out
 from crosscheck2d.reports.terminal.progress import Progress
 from crosscheck2d.scenarios.catalogue import SCENARIOS
 from tests.measured import MEASURED, TABLE
@@ -27,7 +26,6 @@ SCENE = "head_on_equal_e09"
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A run of two engines, of which no bits are kept."""
     folder = tmp_path_factory.mktemp("bits") / "out"
     names = ("pymunk:matched", "reference:exercise")
     plan = RunPlan(
@@ -39,14 +37,11 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def compared(kept: Sequence[dict[str, str]], now: Sequence[dict[str, str]]):
-    """Of two tables with these rows."""
     tables = [bits.read(bits.written(list(rows), {})) for rows in (kept, now)]
     return bits.differences(*tables)
 
 
 def test_the_same_engine_has_the_same_bits_and_another_has_not(made: Path):
-    """At the middle step size, as it plays in this process; also where both are right: the last
-    place tells them apart."""
     with reading(made, COMMAND) as store:
         one, other = bits.rows_of(RunResults.read(store))
     scenario = open_scene(SCENE, 0)
@@ -62,7 +57,6 @@ def test_the_same_engine_has_the_same_bits_and_another_has_not(made: Path):
 
 @pytest.mark.parametrize(("at", "said"), [(0, (-1, 0)), (3, (2, 4)), (5, (4, 8))])
 def test_it_is_said_from_which_sample_on_they_differ(at: int, said: tuple[int, int]):
-    """One last place in one sample, and so in all hashes after it; hashed are 0, 1, 2, 4, 8 ..."""
     name, scenario = "pymunk:matched", open_scene("head_on_equal_e09", 0)
     played = play_once(ENGINES[name].make, name, scenario, scenario.dt(2)).trajectory
     assert played is not None
@@ -81,7 +75,6 @@ def test_it_is_said_from_which_sample_on_they_differ(at: int, said: tuple[int, i
 
 
 def test_an_engine_is_kept_in_every_scene():
-    """At its middle step size, with hashes where it was played to its end."""
     names = set(zip(TABLE.scenario, TABLE.engine + ":" + TABLE.profile))
 
     assert names == {
@@ -95,8 +88,6 @@ def test_an_engine_is_kept_in_every_scene():
 
 @pytest.mark.slow
 def test_a_run_names_what_differs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """One hash of the kept table is changed: exit status 1, and the engine is named; else 0. An
-    engine of which no bits are kept is named, too."""
     kept = tmp_path / "kept.csv"
     monkeypatch.setattr(bits, "KEPT", kept)
     kept.write_text(bits.written([], {"system": "Linux"}))
@@ -117,7 +108,6 @@ def test_a_run_names_what_differs(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
 
 def test_random_scenes_of_another_seed_are_not_compared(made: Path):
-    """The kept bits are those of seed 0."""
     with reading(made, COMMAND) as store:
         results = RunResults.read(store)
         seeded = replace(results, records=[record | {"seed": 1} for record in results.records])
@@ -128,7 +118,6 @@ def test_random_scenes_of_another_seed_are_not_compared(made: Path):
 
 @pytest.mark.long
 def test_this_machine_has_the_kept_bits(tmp_path: Path):
-    """Here; elsewhere an engine may have others, which is what the option is for."""
     engines = [word for name in sorted(MEASURED) for word in ("--engine", name)]
     words = ("run", *engines, "--timings", "0", "--bits", "--out", "out")
 

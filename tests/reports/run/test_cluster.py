@@ -20,14 +20,11 @@ DASK = CROSSCHECK.with_name("dask")
 
 @pytest.fixture(scope="module")
 def long(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of a run of `LONG` that nothing disturbed."""
     return undisturbed(LONG, tmp_path_factory.mktemp("long"))
 
 
 @pytest.mark.long
 def test_a_machine_that_dies_takes_no_cell_along(long: Path, tmp_path: Path):
-    """Two dask workers, of which one is killed in the middle of the run: the other plays its cells,
-    too."""
     with cluster(tmp_path) as (scheduler, machines):
         run = begun(*LONG, "--scheduler", scheduler, cwd=tmp_path, cells=3)
         machines[0].kill()
@@ -43,7 +40,6 @@ def test_a_machine_that_dies_takes_no_cell_along(long: Path, tmp_path: Path):
 def test_a_scheduler_that_goes_is_one_clear_message_and_the_run_can_be_resumed_here(
     long: Path, tmp_path: Path
 ):
-    """Exit 1; what was played is kept, and goes on without a cluster."""
     with cluster(tmp_path) as (scheduler, _):
         run = begun(*LONG, "--scheduler", scheduler, cwd=tmp_path, cells=3)
     _, said = run.communicate(timeout=200)
@@ -72,7 +68,6 @@ def test_without_the_extra_it_is_one_sentence(monkeypatch: pytest.MonkeyPatch):
 def test_an_address_where_no_scheduler_is_is_one_clear_message(
     tmp_path: Path, address: str, said: str
 ):
-    """Exit 2, in one line; nothing is written."""
     done = crosscheck("run", "slow_collision", "--scheduler", address, cwd=tmp_path)
 
     assert done.returncode == 2
@@ -83,8 +78,6 @@ def test_an_address_where_no_scheduler_is_is_one_clear_message(
 
 @contextmanager
 def cluster(cwd: Path) -> Iterator[tuple[str, list[subprocess.Popen]]]:
-    """The address of a dask scheduler with two workers of one thread, started as the README
-    says."""
     log = (cwd / "scheduler.log").open("w")
     words = ["scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard"]
     processes = [subprocess.Popen([DASK, *words], cwd=cwd, stderr=log)]

@@ -13,18 +13,24 @@ import pandas as pd
 import pytest
 
 from crosscheck2d.adapters.engines import ENGINES
-from crosscheck2d.reports.commands.diff import show_difference
+from crosscheck2d.reports.commands.diff import (
+    ROUNDING,
+    Change,
+    Timing,
+    difference,
+    is_rounding,
+    show_difference,
+    timing,
+)
 from crosscheck2d.reports.page.report import make_report
 from crosscheck2d.reports.run import suite
-from crosscheck2d.reports.run.diff import ROUNDING, Change, Timing, difference, is_rounding, timing
-from crosscheck2d.reports.run.plan import Means, RunPlan
+from crosscheck2d.reports.run.comparing import csv_of
 from crosscheck2d.reports.run.results import COMMAND, RunResults
 from crosscheck2d.reports.run.store import writing
-from crosscheck2d.reports.run.suite import carry_out
+from crosscheck2d.reports.run.suite import Means, RunPlan, carry_out
 from crosscheck2d.reports.terminal.exits import Unusable
 from crosscheck2d.reports.terminal.progress import Progress
 from tests.reports.run.small_runs import read
-from tests.reports.run.stored import change_cells, change_plan, change_timings, put_table
 
 PLAN = RunPlan(
     ["slow_collision", "near_miss"],
@@ -38,7 +44,6 @@ PLAN = RunPlan(
 
 
 def run(folder: Path, workers: int) -> Path:
-    """A run of `PLAN`, with its tables."""
     with writing(folder, COMMAND) as store, Progress() as progress:
         carry_out(PLAN, Means(workers), store, progress)
         make_report(RunResults.read(store), progress.say)
@@ -47,23 +52,53 @@ def run(folder: Path, workers: int) -> Path:
 
 @pytest.fixture(scope="module")
 def before(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The run everything is set against."""
     return run(tmp_path_factory.mktemp("diff") / "before", workers=2)
 
 
 @pytest.fixture
 def after(before: Path, tmp_path: Path) -> Path:
-    """A copy of it, to be changed."""
     return Path(shutil.copytree(before, tmp_path / "after"))
 
 
+def change_plan(folder: Path, change: Callable[[dict], object]) -> None:
+    with writing(folder, COMMAND) as store:
+        plan = store.get("run", "plan").value
+        change(plan)
+        store.put("run", "plan", plan)
+
+
+def change_cells(folder: Path, change: Callable[[dict], object]) -> None:
+    with writing(folder, COMMAND) as store:
+        plan = store.get("run", "plan").value
+        for task in plan["tasks"]["cell"]:
+            row = store.get("cell", task[0])
+            value = row.value | {"cell": task[0]}
+            change(value)
+            task[0] = value.pop("cell")
+            store.put("cell", task[0], value, row.blob)
+        store.put("run", "plan", plan)
+
+
+def change_timings(folder: Path, change: Callable[[dict], object]) -> None:
+    with writing(folder, COMMAND) as store:
+        key = store.get("run", "plan").value["timing"]
+        timing = store.get("timing", key).value
+        for line in timing["lines"]:
+            change(line)
+        store.put("timing", key, timing)
+
+
+def put_table(table: pd.DataFrame, folder: Path) -> None:
+    with writing(folder, COMMAND) as store:
+        store.put("comparison", "changed", None, csv_of(table))
+        store.put("run", "comparisons", {"all": "changed"})
+
+
 def elsewhere(plan: dict) -> None:
-    """Another machine in the plan."""
     plan["machine"].update(processor="abacus")
 
 
 def exit_of(before: Path, after: Path) -> object:
-    """What a script sees."""
     with pytest.raises(SystemExit) as left:
         show_difference(before, after)
     return left.value.code
@@ -73,8 +108,6 @@ def exit_of(before: Path, after: Path) -> object:
 def test_the_numbers_do_not_depend_on_workers_or_order(
     before: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    """One worker instead of two, and the cells in any order: deviations.csv is the same byte for
-    byte."""
     run_all = suite.run_all
 
     def shuffled(tasks, *words):
@@ -92,13 +125,11 @@ def test_the_numbers_do_not_depend_on_workers_or_order(
 def test_the_same_run_has_not_changed(
     before: Path, after: Path, capsys: pytest.CaptureFixture[str]
 ):
-    """Exit 0."""
     assert exit_of(before, after) == 0
     assert "Nothing got worse." in capsys.readouterr().out
 
 
 def test_a_number_between_two_engines_counts_for_both(before: Path, after: Path):
-    """So that engines with the same metrics have the same count."""
     same = difference(before, after).same
 
     assert set(same) == {"pymunk:shipped", "pymunk:matched"}
@@ -108,7 +139,6 @@ def test_a_number_between_two_engines_counts_for_both(before: Path, after: Path)
 def test_runs_without_a_common_cell_are_not_said_to_have_got_worse(
     before: Path, after: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ):
-    """Exit 1: the comparison that was asked for cannot be made."""
     nothing = replace(difference(before, after), shared=0)
     monkeypatch.setattr("crosscheck2d.reports.commands.diff.difference", lambda *_: nothing)
 
@@ -121,8 +151,6 @@ def test_runs_without_a_common_cell_are_not_said_to_have_got_worse(
 
 
 def test_one_bit_in_a_cell_that_is_the_same_is_worse(before: Path, after: Path):
-    """Same scene, settings and versions must give the same bits, even where the number got
-    smaller."""
     table = pd.read_csv(after / "deviations.csv", dtype=str, keep_default_na=False)
     row = table.index[(table.metric == "position_max") & (table.versus == "truth")][0]
     table.loc[row, "value"] = repr(float(table.loc[row, "value"]) * (1 - 2**-53))
@@ -137,9 +165,6 @@ def test_one_bit_in_a_cell_that_is_the_same_is_worse(before: Path, after: Path):
 def test_where_versions_differ_the_metric_says_what_is_worse(
     before: Path, after: Path, factor: float, verdict: str
 ):
-    """A larger error is worse, a smaller better, but for rounding; the deviation of two engines is
-    neither; and there is a warning."""
-
     change_cells(after, lambda cell: cell.update(cell=cell["cell"][::-1]))
     change_plan(after, lambda plan: plan["versions"].update(pymunk="8.0"))
     table = pd.read_csv(after / "deviations.csv")
@@ -155,7 +180,6 @@ def test_where_versions_differ_the_metric_says_what_is_worse(
 def test_a_verdict_that_fails_now_is_worse_and_one_that_passes_still_is_neither(
     before: Path, after: Path
 ):
-    """And the other way round it is better."""
     change_plan(after, elsewhere)
     table = pd.read_csv(after / "deviations.csv")
     rows = table.index[table.metric == "tunnelled"]
@@ -185,8 +209,6 @@ def test_a_verdict_that_fails_now_is_worse_and_one_that_passes_still_is_neither(
 def test_a_difference_within_rounding_is_neither_worse_nor_better(
     before: Path, after: Path, moved: float, verdict: str
 ):
-    """Where the bits may differ: on another machine. An error of rounding may grow to many times
-    itself."""
     change_plan(after, elsewhere)
     table = pd.read_csv(after / "deviations.csv")
     rows = (table.metric == "position_max") & (table.versus == "truth")
@@ -214,7 +236,6 @@ def test_a_difference_within_rounding_is_neither_worse_nor_better(
 def test_rounding_is_that_of_the_numbers_of_the_engine(
     engine: str, was: float, now: float, rounding: bool
 ):
-    """Of a number between two engines the coarser of the two counts."""
     assert is_rounding([engine], was, now) == is_rounding([engine], now, was) == rounding
     assert is_rounding([engine, "box2d:matched"], 1e-6, 5e-6)
 
@@ -222,8 +243,6 @@ def test_rounding_is_that_of_the_numbers_of_the_engine(
 def test_an_edited_scene_is_named_and_nothing_in_it_is_called_worse_or_better(
     before: Path, after: Path, capsys: pytest.CaptureFixture[str]
 ):
-    """Its numbers, its statuses and its times are of another scene; those of the others count.
-    What is the same but for rounding is still said to be so."""
     before = Path(shutil.copytree(before, after.parent / "before"))
     for folder in (before, after):
         change_timings(folder, rounds_of([1.0] * 9))
@@ -290,9 +309,6 @@ def test_cells_that_only_one_run_has_are_named_and_not_worse(
 
 
 def rounds_of(costs: list[float], again: float = 1.0) -> Callable[[dict], None]:
-    """Gives every timing these costs, and what was timed twice `again` times as much the second
-    time."""
-
     def change(line: dict) -> None:
         if "timing" in line:
             line["cost"] = [cost * (again if line["copy"] else 1.0) for cost in costs]
@@ -301,8 +317,6 @@ def rounds_of(costs: list[float], again: float = 1.0) -> Callable[[dict], None]:
 
 
 def test_times_of_a_busy_machine_are_not_compared(before: Path, after: Path):
-    """An engine that reads 1.5 against itself: a warning, and no verdict; one that reads 1.05 is
-    compared."""
     change_timings(after, rounds_of([2.0] * 9, again=1.5))
     busy = difference(before, after)
     change_timings(after, rounds_of([2.0] * 9, again=1.05))
@@ -319,7 +333,6 @@ def test_times_of_a_busy_machine_are_not_compared(before: Path, after: Path):
 def test_timings_are_judged_on_one_machine_only(
     before: Path, after: Path, machine: str, verdicts: set[str]
 ):
-    """All twice as slow: worse; on another machine there is a warning instead."""
     before = Path(shutil.copytree(before, after.parent / "before"))
     change_timings(before, rounds_of([1.0] * 9))
     change_timings(after, rounds_of([2.0] * 9))
@@ -343,19 +356,15 @@ def test_timings_are_judged_on_one_machine_only(
     ],
 )
 def test_a_timing_is_worse_only_if_it_is_sure_and_large(ratios: list[float], verdict: str):
-    """Two gates: the sign test's interval, and a factor."""
     assert timing("any", sorted(ratios), median(ratios)).verdict == verdict
 
 
 def test_a_machine_that_is_busy_in_all_rounds_but_one_does_not_make_an_engine_slower():
-    """Sure, and large in the median: but the least time is as it was."""
     assert timing("any", [1.0] + [3.0] * 19, 1.0).verdict == "same"
     assert timing("any", [1.0] + [3.0] * 19, 1.5).verdict == "worse"
 
 
 def test_the_interval_holds_the_true_median_as_often_as_it_says():
-    """Of 2000 samples of 20 from a lopsided distribution of median 1, at least 98.5 % of intervals
-    hold it."""
     draw = random.Random(1)
     found = [
         timing("any", sorted(draw.expovariate(0.6931471805599453) for _ in range(20)), 1.0)
@@ -367,8 +376,6 @@ def test_the_interval_holds_the_true_median_as_often_as_it_says():
 
 
 def test_a_scene_that_is_not_judged_any_more_is_worse(before: Path, after: Path):
-    """Its exact answer took too long: its numbers are gone, which no other row would tell; the
-    other way is better."""
     table = pd.read_csv(after / "deviations.csv", dtype=str, keep_default_na=False)
     judged = table[(table.scenario != "slow_collision") | (table.versus != "truth")]
     runs = table[table.scenario == "slow_collision"].drop_duplicates(["engine", "profile", "dt_s"])

@@ -22,7 +22,6 @@ TRAJECTORIES = "--trajectories"
 
 
 def undisturbed(words: list[str], cwd: Path) -> Path:
-    """The folder of a run that nothing disturbed."""
     done = crosscheck(*words, TRAJECTORIES, "--out", "whole", cwd=cwd)
     assert done.returncode == 0, done.stderr
     return cwd / "whole"
@@ -39,7 +38,6 @@ def long(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def begun(*words: str | Path, cwd: Path, cells: int) -> subprocess.Popen[str]:
-    """`crosscheck ... --out out`, of which so many cells have ended; in a session of its own."""
     command = [CROSSCHECK, *words, TRAJECTORIES, "--out", "out"]
     run = subprocess.Popen(
         command, cwd=cwd, stderr=subprocess.PIPE, text=True, start_new_session=True
@@ -49,7 +47,6 @@ def begun(*words: str | Path, cwd: Path, cells: int) -> subprocess.Popen[str]:
 
 
 def assert_nothing_lost(out: Path, whole: Path) -> None:
-    """The same bytes, except the seconds in runs.csv."""
     assert (out / "deviations.csv").read_bytes() == (whole / "deviations.csv").read_bytes()
     names = sorted(path.name for path in (whole / "trajectories").iterdir())
     assert sorted(path.name for path in (out / "trajectories").iterdir()) == names
@@ -66,13 +63,11 @@ def assert_nothing_lost(out: Path, whole: Path) -> None:
 
 
 def again(words: list[str], cwd: Path) -> None:
-    """Run into `out` again, to the end."""
     done = crosscheck(*words, TRAJECTORIES, "--out", "out", cwd=cwd)
     assert done.returncode == 0, done.stderr
 
 
 def alive(pid: int) -> bool:
-    """Whether a process runs, or is at least not yet a zombie."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except OSError:
@@ -80,13 +75,11 @@ def alive(pid: int) -> bool:
 
 
 def children_of(parent: int) -> list[int]:
-    """The worker processes of a run."""
     return [int(pid) for pid in Path(f"/proc/{parent}/task/{parent}/children").read_text().split()]
 
 
 @pytest.mark.parametrize("times", [2, pytest.param(20, marks=pytest.mark.long)])
 def test_a_run_that_is_killed_at_random_is_gone_on_with(small: Path, tmp_path: Path, times: int):
-    """`kill -9`, whatever it does; no worker outlives it."""
     draw = random.Random(times)
     for _ in range(times):
         command = [CROSSCHECK, *SMALL, TRAJECTORIES, "--timings", "1", "--out", "out"]
@@ -105,7 +98,6 @@ def test_a_run_that_is_killed_at_random_is_gone_on_with(small: Path, tmp_path: P
 
 
 def test_workers_that_are_killed_are_replaced(long: Path, tmp_path: Path):
-    """`kill -9` of a worker, now and then during a run."""
     run = begun(*LONG, cwd=tmp_path, cells=1)
     killed = 0
     for count in (1, 8, 16):
@@ -134,7 +126,6 @@ def test_ctrl_c_keeps_what_has_ended_and_says_how_to_go_on(long: Path, tmp_path:
 
 
 def test_two_runs_into_one_folder_are_one(small: Path, tmp_path: Path):
-    """The one that is second is refused, whichever that is."""
     command = [CROSSCHECK, *SMALL, TRAJECTORIES, "--out", "out"]
     both = [
         subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) for _ in "ab"
@@ -166,7 +157,6 @@ def test_an_edited_row_is_made_again_and_a_torn_file_is_one_sentence(small: Path
 
 
 def test_what_was_played_is_not_played_again_and_other_plans_use_it(small: Path, tmp_path: Path):
-    """A part of the plan takes its rows; its tables have no others; --fresh plays it again."""
     out = Path(shutil.copytree(small, tmp_path / "out"))
     with writing(out, COMMAND) as store:
         before = {key: store.get("cell", key).digest for key in store.rows.keys("cell")}
@@ -186,7 +176,6 @@ def test_what_was_played_is_not_played_again_and_other_plans_use_it(small: Path,
 
 @pytest.fixture
 def disk(tmp_path: Path):
-    """A file system of 300 kB; skips where none can be mounted."""
     place = tmp_path / "disk"
     place.mkdir()
     words = ["mount", "-t", "tmpfs", "-o", "size=300k", "tmpfs", str(place)]
@@ -197,7 +186,6 @@ def disk(tmp_path: Path):
 
 
 def test_a_full_disk_is_one_sentence_and_what_has_ended_is_kept(disk: Path, tmp_path: Path):
-    """Exit 1; with more room the same command goes on."""
     words = [*SMALL, "--timings", "0", "--out", str(disk / "out")]
     full = crosscheck(*words, cwd=tmp_path)
     had = cells_in(disk / "out")

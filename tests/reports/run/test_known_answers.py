@@ -17,7 +17,5 @@ from crosscheck2d.reports.run.known_answers import KNOWN_ANSWERS, KnownAnswer
     ],
 )
 def test_a_published_number_comes_out_digit_for_digit(known: KnownAnswer):
-    """ODE's column out of pymunk and out of a step that falls or reflects, Bullet's out of one that
-    does both."""
     # Published with six significant digits; both sides sum the same doubles in another order.
     assert f"{known.reproduce():.6g}" == f"{known.published_J2:.6g}"

@@ -12,11 +12,10 @@ import pytest
 from crosscheck2d.adapters.host.engine import row_of_file
 from crosscheck2d.reports.check.verdict import check_file
 from crosscheck2d.reports.commands.own_solvers import checked, checks_of, lines
-from crosscheck2d.reports.run.plan import Check, Means, RunPlan, RunTask
 from crosscheck2d.reports.run.pool import Failure
 from crosscheck2d.reports.run.results import COMMAND
 from crosscheck2d.reports.run.store import writing
-from crosscheck2d.reports.run.suite import Suite
+from crosscheck2d.reports.run.suite import Check, RunPlan, RunTask, store_finding
 from crosscheck2d.reports.terminal.progress import Progress
 from tests.reports.run.small_runs import read
 from tests.reports.terminal.command_line import crosscheck
@@ -26,7 +25,6 @@ from tests.solvers.mutants import MUTANTS
 
 
 def test_a_check_is_that_of_the_text_that_plays(tmp_path: Path):
-    """That of another text, or none at all, is said to be so, and is made again."""
     path = FAULTY.write(tmp_path)
     name = f"{path}:own"
     plan = cast(RunPlan, type("Plan", (), {"engines": {name: row_of_file(path)}}))
@@ -35,9 +33,8 @@ def test_a_check_is_that_of_the_text_that_plays(tmp_path: Path):
     rows = []
     with writing(tmp_path / "out", COMMAND) as store, Progress() as progress:
         progress.start(3, 3)
-        suite = Suite(plan, Means(1), store, {}, progress)
         for result in (right, later, Failure("timeout", "was stopped")):
-            suite.keep(RunTask("check", "key", name), result)
+            store_finding(store, RunTask("check", "key", name), plan, result, progress)
             rows.append(store.get("check", "key").value)
 
     assert FAULTY.cause in right.says[0]
@@ -51,12 +48,10 @@ def test_a_check_is_that_of_the_text_that_plays(tmp_path: Path):
 
 
 def test_only_solvers_files_are_checked():
-    """Engines of the table have no file."""
     assert list(checks_of(["pymunk:matched", "a/Exercise.js:own"])) == ["a/Exercise.js:own"]
 
 
 def test_sentences_are_numbered_where_there_are_some():
-    """As `check` prints them."""
     assert lines("a.js:own", ["First.", "Second."]) == [
         "a.js, by crosscheck check:",
         "  1. First.",
@@ -67,8 +62,6 @@ def test_sentences_are_numbered_where_there_are_some():
 
 @pytest.mark.slow  # a file, checked and asked to play
 def test_a_run_says_once_why_a_file_does_not_play(tmp_path: Path):
-    """The scene has another restitution than the file: one line with the reason and how many cells,
-    and no count of nothing."""
     path = FAULTY.write(tmp_path)
     words = ["head_on_equal_e05", "--engine", path.name, "--timings", "0", "--out", "out"]
     done = crosscheck("run", *words, cwd=tmp_path)
@@ -84,8 +77,6 @@ def test_a_run_says_once_why_a_file_does_not_play(tmp_path: Path):
 
 @pytest.mark.long
 def test_a_run_says_what_check_says(tmp_path: Path):
-    """The second command of the README, of a faulty file: played at every step, with the same cause
-    first on the page and in the terminal; a resumed run does not check again what it has."""
     path = FAULTY.write(tmp_path)
     words = ["head_on_equal_e09", "--engine", path.name, "--engine", "pymunk", "--out", "beside"]
     first = check_file(path).sentences[0]

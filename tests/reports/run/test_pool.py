@@ -21,9 +21,15 @@ from crosscheck2d.adapters.engine_row import EngineRow
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.reports.run import playing, pool
 from crosscheck2d.reports.run.cells import Cell
-from crosscheck2d.reports.run.playing import CellResult, play_cell, play_here
+from crosscheck2d.reports.run.playing import (
+    CellResult,
+    from_trail,
+    load_trajectory,
+    pack,
+    play_cell,
+    play_here,
+)
 from crosscheck2d.reports.run.pool import Failure, affordable, run_all
-from crosscheck2d.reports.run.trajectories import from_trail, load_trajectory, packed
 from crosscheck2d.scenarios.catalogue import scenario
 from tests.conftest import START_PROCESS
 from tests.forks import start_worker
@@ -32,11 +38,10 @@ from tests.reports.run.control_engines import (
     FATAL,
     SLOW,
     Controlled,
-    HangsInLoad,
-    LoadsSlowly,
-    LoadsSlowlyAndHangs,
-    Once,
     Remembers,
+    hangs,
+    is_killed_once,
+    loads_slowly,
     row,
 )
 
@@ -46,7 +51,6 @@ GOOD = {f"good{i}:control": row(Controlled) for i in range(24)}
 
 
 def cells(rows: dict[str, EngineRow]) -> dict[str, partial]:
-    """A task a row: `SCENE` at its coarsest step."""
     question = replace(scenario(SCENE), truth=None)
     return {
         name: partial(play_here, Cell(SCENE, 0, name, 1), row, question)
@@ -62,7 +66,6 @@ def cells(rows: dict[str, EngineRow]) -> dict[str, partial]:
     ],
 )
 def ended(request: pytest.FixtureRequest) -> dict[str, CellResult | Failure]:
-    """How 24 good cells ended and nine bad ones among them, on two workers."""
     mixed = {**dict(list(GOOD.items())[:12]), **CONTROLS, **dict(list(GOOD.items())[12:])}
     tasks = cells(mixed)
     # by itself, for the others may need long on a busy machine
@@ -80,7 +83,6 @@ def ended(request: pytest.FixtureRequest) -> dict[str, CellResult | Failure]:
 
 
 def test_every_good_cell_is_kept(ended):
-    """24 of 24, all of the same bits."""
     files = {ended[name].file for name in GOOD}
 
     assert {ended[name].run.status for name in GOOD} == {"ok"}
@@ -91,23 +93,22 @@ def test_every_good_cell_is_kept(ended):
     ("engine", "status", "said"),
     [
         ("raises", "error", "RuntimeError: no such luck"),
-        ("aborts", "crashed", "SIGABRT in misbehave, line "),
+        ("aborts", "crashed", "SIGABRT in aborts, line "),
         (
             "aborts",
             "crashed",
             'of run/control_engines.py; it had printed "assertion failed: mass > 0"',
         ),
         ("segfaults", "crashed", "SIGSEGV in string_at, line "),
-        ("hangs", "timeout", "stopped after 3 s in misbehave, line "),
+        ("hangs", "timeout", "stopped after 3 s in hangs, line "),
         ("devours", "error", "MemoryError: took more than 500 MB (--memory)"),
-        ("turnstonan", "diverged", f"of disk 0 is not finite at {FATAL / 60:g} s"),
+        ("turns_to_nan", "diverged", f"of disk 0 is not finite at {FATAL / 60:g} s"),
         ("prints", "ok", ""),
         ("leaves", "crashed", "was killed 2 times"),
-        ("iskilled", "crashed", "was killed 2 times"),
+        ("is_killed", "crashed", "was killed 2 times"),
     ],
 )
 def test_a_bad_cell_says_how_it_ended_and_where(ended, engine: str, status: str, said: str):
-    """Status and reason; a crash has the signal and the line of Python, a divergence its time."""
     outcome = ended[f"{engine}:control"]
     run = outcome if isinstance(outcome, Failure) else outcome.run
 
@@ -117,7 +118,6 @@ def test_a_bad_cell_says_how_it_ended_and_where(ended, engine: str, status: str,
 
 @pytest.mark.parametrize("engine", ["aborts", "segfaults", "hangs"])
 def test_what_died_leaves_every_good_state_before(ended, engine: str):
-    """The trail holds the same bits as a run that lives, up to the sample before the fatal step."""
     trajectory = from_trail(ended[f"{engine}:control"].trail, scenario(SCENE))
     whole = play_cell(
         Cell(SCENE, 0, "good:control", 1), row(Controlled), scenario(SCENE)
@@ -130,25 +130,30 @@ def test_what_died_leaves_every_good_state_before(ended, engine: str):
 
 @pytest.mark.slow
 def test_the_clock_of_a_cell_starts_when_its_engine_is_loaded():
-    """Loading that takes longer than the time-out is no fault; a hang after it is, and so is one
-    that never loads."""
-    slow = {"slow:control": row(LoadsSlowly), "hangs:control": row(LoadsSlowlyAndHangs)}
+    slow = {
+        "slow:control": row(partial(Controlled, in_load=loads_slowly)),
+        "hangs:control": row(partial(Controlled, hangs, loads_slowly)),
+    }
     ended = dict(run_all(cells(slow), workers=2, timeout=SLOW / 2))
     question = replace(scenario(SCENE), truth=None)
     stuck = {
-        "stuck": partial(impatient, Cell(SCENE, 0, "stuck:control", 1), row(HangsInLoad), question)
+        "stuck": partial(
+            impatient,
+            Cell(SCENE, 0, "stuck:control", 1),
+            row(partial(Controlled, in_load=hangs)),
+            question,
+        )
     }
     [(_, never)] = run_all(stuck, workers=1, timeout=1.0)
 
     assert ended["slow:control"].run.status == "ok"
     assert ended["hangs:control"].status == "timeout"
-    assert f"stopped after {SLOW / 2:g} s in misbehave" in ended["hangs:control"].reason
+    assert f"stopped after {SLOW / 2:g} s in hangs" in ended["hangs:control"].reason
     assert never.status == "timeout"
-    assert "stopped after 3 s in load" in never.reason
+    assert "stopped after 3 s in hangs" in never.reason
 
 
 def impatient(*words: Any) -> CellResult:
-    """In the worker: play, with little time to load."""
     playing.LOADING = 3.0
     return play_here(*words)
 
@@ -156,10 +161,17 @@ def impatient(*words: Any) -> CellResult:
 def test_a_worker_that_is_killed_from_outside_is_no_fault_of_its_cell(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    """`kill -9` once: the cell is played again and is as good as any."""
     monkeypatch.setenv("CONTROL_MARK", str(tmp_path / "mark"))
     results = dict(
-        run_all(cells({"once:control": row(Once), "good:control": row(Controlled)}), workers=1)
+        run_all(
+            cells(
+                {
+                    "once:control": row(partial(Controlled, is_killed_once)),
+                    "good:control": row(Controlled),
+                }
+            ),
+            workers=1,
+        )
     )
 
     assert (tmp_path / "mark").exists()
@@ -167,8 +179,6 @@ def test_a_worker_that_is_killed_from_outside_is_no_fault_of_its_cell(
 
 
 def test_an_engine_that_leaves_state_gets_a_process_a_cell():
-    """Declared in its row, the same cell gives the same bits again and again; not declared, it does
-    not."""
     tasks = cells(
         {f"{kind}{i}:control": row(Remembers) for kind in ("alone", "together") for i in range(3)}
     )
@@ -186,8 +196,6 @@ def test_an_engine_that_leaves_state_gets_a_process_a_cell():
 
 @pytest.mark.parametrize("name", ENGINES)
 def test_no_engine_remembers_what_it_played(name: str):
-    """After other scenes in the same process a cell has the bits it has as the first, so no row has
-    `leaves_state`."""
     first, *others = ("slow_collision", "line_gas", "falling_box")
     tasks = {
         key: partial(
@@ -222,7 +230,6 @@ def gives_a_function() -> Callable[[], None]:
 
 
 def not_importable() -> Any:
-    """A task of a module that no other process can import."""
     module = sys.modules["only_here"] = ModuleType("only_here")
     exec("def task(): pass", module.__dict__)
     return module.task
@@ -284,7 +291,6 @@ def waits() -> str:
 
 
 def test_a_clock_that_jumps_stops_no_task(monkeypatch: pytest.MonkeyPatch):
-    """The time of the day is set a year ahead, and back, while a task runs."""
     now = time.time()
     monkeypatch.setattr(
         time, "time", lambda: now + 3e7 * (1 if time.monotonic() % 0.2 < 0.1 else -1)
@@ -294,7 +300,6 @@ def test_a_clock_that_jumps_stops_no_task(monkeypatch: pytest.MonkeyPatch):
 
 
 def test_urgent_tasks_start_before_the_others():
-    """They may be added meanwhile."""
     urgent: deque[Any] = deque()
     order = []
     for key, _ in run_all({k: os.getpid for k in range(4)}, workers=1, urgent=urgent):
@@ -305,13 +310,11 @@ def test_urgent_tasks_start_before_the_others():
     assert order.index("urgent") <= 2
 
 
-def test_a_trajectory_comes_back_from_its_file_bit_for_bit(tmp_path: Path):
-    """The .npz holds every array of the trajectory and its collisions."""
+def test_a_trajectory_comes_back_from_its_file_bit_for_bit():
     here = play_cell(
         Cell("line_gas", 0, "pymunk:matched", 1), ENGINES["pymunk:matched"], scenario("line_gas")
     ).trajectory
-    (tmp_path / "one.npz").write_bytes(packed(here))
-    there = load_trajectory(tmp_path / "one.npz")
+    there = load_trajectory(pack(here))
 
     assert len(here.collisions)
     for name in ("t", "position", "velocity", "angle", "angular_velocity"):

@@ -53,8 +53,6 @@ WORDS = ["run", "head_on_equal_e09", "--dt", str(1 / 60)]
 
 
 def place(folder: Path, file: str, factor: int) -> Path:
-    """Write a solver whose flight is `factor` times as fast, by what stands in `file`, and return
-    where it is."""
     if file in TEXTS:
         old, new = FASTER[file]
         assert old in TEXTS[file]
@@ -82,7 +80,6 @@ SAVED = [
 
 
 def played(row) -> Run:
-    """A scene of two disks by it."""
     engine, question = row.make(), scenario("head_on_equal_e09")
     run = play(engine, "x:own", question, question.dt(1))
     engine.close()
@@ -94,8 +91,6 @@ def played(row) -> Run:
 def test_the_text_that_was_read_is_played_whatever_is_saved_since(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, file: str
 ):
-    """A row made before plays the old text, one made after the new one, and neither what numba kept
-    of the other."""
     monkeypatch.setenv("CROSSCHECK_CACHE", str(tmp_path / "cache"))
     before = row_of_file(place(tmp_path, file, 1))
     after = row_of_file(place(tmp_path, file, 2))
@@ -115,8 +110,6 @@ def test_the_text_that_was_read_is_played_whatever_is_saved_since(
 def test_what_numba_keeps_would_be_taken_for_another_text(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, file: str
 ):
-    """The negative control: compiled from where the file is, the old text's code is played for the
-    new one."""
     monkeypatch.setenv("CROSSCHECK_CACHE", str(tmp_path / "cache"))
     monkeypatch.setattr(solver_process, "kept_copies", lambda solver, _: solver.path.parent)
     before = row_of_file(place(tmp_path, file, 1))
@@ -147,14 +140,10 @@ def sphereSphereCollisionHandling(a, b): pass
 def test_what_a_file_has_kept_is_gone_in_the_next_cell_of_a_worker(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, file: str
 ):
-    """Though one process plays both: a file that moves a sphere by the number of its calls so far
-    plays the same twice."""
     started = Counter()
     begin = solver_process.SolverProcess.begin
     monkeypatch.setattr(
-        solver_process.SolverProcess,
-        "begin",
-        lambda self: (started.update([file]), begin(self)),
+        solver_process.SolverProcess, "begin", lambda self: (started.update([file]), begin(self))
     )
     (tmp_path / file).write_text(COUNTS[file])
     row = row_of_file(tmp_path / file)
@@ -173,7 +162,6 @@ def test_what_a_file_has_kept_is_gone_in_the_next_cell_of_a_worker(
 def test_a_file_that_is_saved_during_a_run_is_kept_as_what_was_played(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, file: str
 ):
-    """The same command then plays the new text, to the same bits as a run of it alone."""
     path = place(tmp_path, file, 1)
     meanwhile(monkeypatch, lambda: place(tmp_path, file, 2))
     assert crosscheck(*WORDS, "--engine", path.name, "--out", "out", cwd=tmp_path).returncode == 0
@@ -192,7 +180,6 @@ def test_a_file_that_is_saved_during_a_run_is_kept_as_what_was_played(
 def test_a_file_that_vanishes_during_a_run_is_played_to_the_end(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, file: str
 ):
-    """All of it was read; the same command again is refused in a sentence."""
     path = place(tmp_path, file, 1)
     meanwhile(monkeypatch, path.unlink)
     words = *WORDS, "--engine", path.name, "--engine", "pymunk:matched", "--out", "out"
@@ -208,18 +195,16 @@ def test_a_file_that_vanishes_during_a_run_is_played_to_the_end(
 
 
 def meanwhile(monkeypatch: pytest.MonkeyPatch, act: Callable[[], object]) -> None:
-    """When a run has begun, before any cell is played, `act`."""
-    begin = suite.Suite.run
+    run_tasks = suite.run_tasks
 
-    def act_and_begin(*given) -> None:
+    def act_and_run(*given) -> int:
         act()
-        begin(*given)
+        return run_tasks(*given)
 
-    monkeypatch.setattr(suite.Suite, "run", act_and_begin)
+    monkeypatch.setattr(suite, "run_tasks", act_and_run)
 
 
 def flight(out: Path) -> tuple[list[str], list[bytes]]:
-    """The keys of the cells of a run, and the positions that it has of each."""
     with reading(out, COMMAND) as store:
         results = RunResults.read(store)
         positions = [results.trajectory(record).position for record in results.records]
@@ -228,7 +213,6 @@ def flight(out: Path) -> tuple[list[str], list[bytes]]:
 
 @pytest.mark.slow
 def test_the_page_of_a_check_shows_the_text_that_was_checked(tmp_path: Path):
-    """Its digest and its smallest scene, though the file is gone since."""
     path = place(tmp_path, "plain.js", 2)
     digest = read_solver(path).digest
     check = check_file(path)
@@ -243,7 +227,6 @@ def test_the_page_of_a_check_shows_the_text_that_was_checked(tmp_path: Path):
 
 
 def test_a_run_says_which_modules_beside_the_file_were_played(tmp_path: Path):
-    """In its settings, with a hash over all, so that two runs can be distinguished."""
     run = played(row_of_file(place(tmp_path, "beside", 1)))
 
     assert run.settings["from beside it"][1].startswith("helper.py; sha256 of all ")
@@ -262,7 +245,6 @@ def test_a_run_says_which_modules_beside_the_file_were_played(tmp_path: Path):
 def test_a_module_beside_the_file_that_cannot_be_read_is_named(
     tmp_path: Path, make: Callable[[Path], object], said: str
 ):
-    """Nothing is waited for; a link to nothing is no module, as for Python."""
     make(tmp_path / "helper.py")
     (tmp_path / "solver.py").write_text("import helper\n" + TEXTS["plain.py"])
     if not said:
@@ -273,7 +255,6 @@ def test_a_module_beside_the_file_that_cannot_be_read_is_named(
 
 
 def test_modules_beside_the_file_are_read_up_to_a_limit(tmp_path: Path):
-    """A package of 2 MB is no solver."""
     (tmp_path / "package").mkdir()
     for k in range(4):
         (tmp_path / "package" / f"part{k}.py").write_text("#" * (LARGEST // 2))

@@ -14,10 +14,10 @@ import pytest
 
 from crosscheck2d.reports.run import cells, comparing
 from crosscheck2d.reports.run.cells import JUDGE_SOURCE, ROOT, SOURCES
-from crosscheck2d.reports.run.comparing import ANSWER, COMPARED, CompareTask, SceneTasks, no_answer
+from crosscheck2d.reports.run.comparing import ANSWER, COMPARED, CompareTask, store_answer
 from crosscheck2d.reports.run.pool import Failure
 from crosscheck2d.reports.run.results import COMMAND, RunResults
-from crosscheck2d.reports.run.store import Store, writing
+from crosscheck2d.reports.run.store import Store, reading, writing
 from crosscheck2d.reports.run.tables import comparisons_of, make_tables
 from crosscheck2d.scenarios.truth import cache
 from tests.reports.run.small_runs import make
@@ -26,9 +26,13 @@ SCENE = Path(__file__).parents[3] / "tests" / "data" / "scenes" / "two.toml"
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A run of two scenes on two engines, with its tables."""
-    folder = make(tmp_path_factory.mktemp("tables") / "out", SCENE)
+def played(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return make(tmp_path_factory.mktemp("tables") / "out", SCENE)
+
+
+@pytest.fixture(scope="module")
+def folder(played: Path) -> Path:
+    folder = Path(shutil.copytree(played, played.parent / "tables"))
     with writing(folder, COMMAND) as store:
         make_tables(RunResults.read(store), silent)
     return folder
@@ -36,7 +40,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def store(folder: Path, tmp_path: Path):
-    """The rows of a copy of it."""
     with writing(Path(shutil.copytree(folder, tmp_path / "out")), COMMAND) as store:
         yield store
 
@@ -46,21 +49,15 @@ def silent(_: str) -> None:
 
 
 def deviations(store: Store) -> bytes:
-    """The table in the folder."""
     return (store.folder / "deviations.csv").read_bytes()
 
 
-def test_all_is_compared_while_it_is_played(store: Store, monkeypatch: pytest.MonkeyPatch):
-    """The tables are put together, and no worker is asked."""
-    monkeypatch.setattr(comparing, "compare_scene", None)
-    monkeypatch.setattr(comparing, "compute_answer", None)
-    made = make_tables(RunResults.read(store), silent)
-
-    assert len(made.scenes.tables) == len(made.scenes.answers) == 2
+def test_all_is_compared_while_it_is_played(played: Path):
+    with reading(played, COMMAND) as store:
+        assert [len(store.rows.keys(kind)) for kind in (ANSWER, COMPARED)] == [2, 2]
 
 
 def test_what_is_kept_is_what_is_compared(store: Store):
-    """Every bit is the same in what is compared here and now and in what the page is made from."""
     results = RunResults.read(store)
     made = make_tables(results, silent)
     again = comparisons_of(results, made)
@@ -68,7 +65,7 @@ def test_what_is_kept_is_what_is_compared(store: Store):
         source = results.sources[scene]
         csv = CompareTask(store, source, records, comparing.compute_answer(source))()
 
-        assert csv == made.scenes.tables[scene].csv
+        assert csv == made.scenes[scene].table
         assert all(run.trajectory for run in comparison.middle_runs)
         assert np.array_equal(comparing.read_scene_table(csv).columns, comparison.table.columns)
 
@@ -88,7 +85,6 @@ def test_tables_that_are_gone_are_made_again_to_the_same_bytes(store: Store):
 def test_a_worker_that_is_killed_while_it_compares_loses_nothing(
     store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    """`kill -9` once, after the judge has changed: all is compared anew, to the same bytes."""
     whole, before = deviations(store), {*store.rows.keys(COMPARED)}
     monkeypatch.setattr(comparing, "judge_hash", lambda: "another metric")
     monkeypatch.setattr(comparing, "compare_scene", partial(killed_once, tmp_path / "mark"))
@@ -103,39 +99,15 @@ COMPARE = comparing.compare_scene
 
 
 def killed_once(mark: Path, *given: Any) -> bytes:
-    """In the worker: what the system does that has no memory left, the first time only."""
     if not mark.exists():
         mark.touch()
         os.kill(os.getpid(), signal.SIGKILL)
     return COMPARE(*given)
 
 
-def test_a_scene_is_answered_then_compared_when_its_last_cell_has_ended(store: Store):
-    """Each once, and not before."""
-    for kind in (ANSWER, COMPARED):
-        for key in store.rows.keys(kind):
-            store.rows.delete(kind, key)
-    results = RunResults.read(store)
-    tasks = SceneTasks(store, results.cells, results.sources, {}, 60.0)
-    begun: list[Any] = []
-    last = [keys[-1] for keys in results.cells.values()]
-    for record in results.records:
-        tasks.records[record["cell"]] = record
-        begun.append([*tasks.next_task(record["scene"])])
-    first = [task for ended in begun for task in ended]
-    assert [record["cell"] for record, ended in zip(results.records, begun) if ended] == last
-    assert tasks.awaited == list(results.cells)
-    then = [task for key, work in first for task in tasks.task_ended(key, work())]
-    after = [task for key, work in then for task in tasks.task_ended(key, work())]
-
-    assert [key[0] for key, _ in (*first, *then)] == [ANSWER] * 2 + [COMPARED] * 2
-    assert after == [*tasks.tasks()] == tasks.awaited == []
-
-
 def test_a_comparison_that_fails_is_a_row_a_run_and_leaves_the_other_scene(
     store: Store, monkeypatch: pytest.MonkeyPatch
 ):
-    """It says what was raised, in the worker; the scene is held to no answer."""
     row = store.get("run", "comparisons").value
     store.rows.delete(COMPARED, row["slow_collision"])
     monkeypatch.setattr(comparing, "compare_scene", fails)
@@ -157,18 +129,15 @@ WHY = "the comparison could not be made: error: ZeroDivisionError: of a metric"
 
 
 def fails(*_: object) -> bytes:
-    """What a metric with a fault does."""
     raise ZeroDivisionError("of a metric")
 
 
 def test_an_answer_that_took_too_long_is_computed_again_only_with_more_time(store: Store):
-    """One that was not there in 5 s is not tried again within 5 s; within 6 s it is."""
     whole = deviations(store)
     results = RunResults.read(store)
     source = results.sources["slow_collision"]
-    key = comparing.digest(repr((source.digest, comparing.judge_hash())).encode())
-    late = no_answer(Failure("timeout", "stopped after 5 s"), 5.0)
-    store.put(ANSWER, key, late[1:])
+    late = Failure("timeout", "stopped after 5 s")
+    store_answer(store, comparing.answer_key(source), late, 5.0)
     for record in results.records:
         record["timeout_s"] = 5.0
     without = make_tables(results, silent)
@@ -197,17 +166,18 @@ def test_trajectories_are_exported_when_asked_for(store: Store):
 
 
 def engine_source(root: Path) -> str:
-    """The hash of the engines' source."""
     return cells.source_hash(SOURCES, root)
 
 
 def judge_source(root: Path) -> str:
-    """The hash of the source that compares."""
     return cells.source_hash(JUDGE_SOURCE, root)
 
 
+def truth_source(root: Path) -> str:
+    return cache.source_hash(root / "scenarios" / "truth")
+
+
 def test_all_that_the_comparison_imports_of_reports_is_in_the_folder_that_is_hashed():
-    """So that a changed metric is measured again."""
     folder = ROOT / "reports" / "compare"
     imported = {
         node.module or ""
@@ -231,20 +201,13 @@ def test_all_that_the_comparison_imports_of_reports_is_in_the_folder_that_is_has
         ("reference_impl/ordered.py", engine_source),
         ("reports/compare/metrics.py", judge_source),
         ("scenarios/truth/oracle/events.py", judge_source),
-        (
-            "scenarios/truth/oracle/events.py",
-            lambda root: cache.source_hash(root / "scenarios" / "truth"),
-        ),
-        (
-            "scenarios/truth/horizon.py",
-            lambda root: cache.source_hash(root / "scenarios" / "truth"),
-        ),
+        ("scenarios/truth/oracle/events.py", truth_source),
+        ("scenarios/truth/horizon.py", truth_source),
     ],
 )
 def test_a_file_that_is_moved_into_a_folder_of_its_own_stays_in_the_hash(
     file, hashed, tmp_path: Path
 ):
-    """Else a change of it would be served by results that it did not make."""
     where, moved = (
         tmp_path / "before" / file,
         tmp_path / "after" / Path(file).parent / "deeper" / Path(file).name,

@@ -36,19 +36,16 @@ RUN = ("near_miss", "--engine", "pymunk", "--out", "out", "--workers", "1")
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where a run into `out` was made, by one that is asked for no more than ever."""
     folder = tmp_path_factory.mktemp("timed")
     assert crosscheck("run", *RUN, cwd=folder).returncode == 0
     return folder
 
 
 def timing_lines(folder: Path) -> list[dict]:
-    """Those of its row."""
     return read(folder / "out").timing.get("lines", [])
 
 
 def test_every_cell_that_was_played_is_timed_and_its_binding_beside_it(folder: Path):
-    """A row a cell, none cheaper than nothing; the middle step size twice."""
     table = pd.read_csv(folder / "out" / TABLE)
     steps = len(scenario("near_miss").substeps)
 
@@ -60,7 +57,6 @@ def test_every_cell_that_was_played_is_timed_and_its_binding_beside_it(folder: P
 
 
 def test_times_are_used_again_with_their_date_and_taken_again_on_demand(folder: Path):
-    """A report and a second run have the same bytes; `report --timings` has other times."""
     path, before = folder / "out" / TABLE, timing_lines(folder)
     written = path.read_bytes()
     path.unlink()
@@ -77,7 +73,6 @@ def test_times_are_used_again_with_their_date_and_taken_again_on_demand(folder: 
 
 
 def test_without_a_second_nothing_is_timed(tmp_path: Path):
-    """The table has its columns and no row, and the page says why."""
     done = crosscheck("run", *RUN, "--timings", "0", cwd=tmp_path)
     take = f"crosscheck report {tmp_path / 'out'} --timings 12"
 
@@ -91,7 +86,6 @@ def test_without_a_second_nothing_is_timed(tmp_path: Path):
 
 
 def test_scenes_that_need_different_things_are_timed_else_the_first_played():
-    """Each is in the catalogue; of others as many."""
     others = [name for name in SCENARIOS if name not in SCENES]
 
     assert set(SCENES) <= set(SCENARIOS)
@@ -103,8 +97,6 @@ def test_scenes_that_need_different_things_are_timed_else_the_first_played():
 def test_the_pass_ends_in_time_and_leaves_out_a_round_that_is_not_whole(
     monkeypatch: pytest.MonkeyPatch,
 ):
-    """Four things of 1 s in 10.5 s: a warm-up and one round; the second round is not half there.
-    Without a limit all rounds are."""
     clock = 0.0
 
     def run() -> Spent:
@@ -124,8 +116,6 @@ def test_the_pass_ends_in_time_and_leaves_out_a_round_that_is_not_whole(
 
 
 def test_of_a_long_scene_only_the_first_part_is_timed_and_the_same_of_every_engine():
-    """Halved until disks times steps are at most `WORK`; a short one is whole. A second of a stack
-    costs otherwise at the start than later, so parts that depend on the engine compare nothing."""
     parts = {
         name: {
             CellToTime("key", engine, ENGINES[engine], scenario(name), substeps, 0).part.duration
@@ -145,7 +135,6 @@ def test_of_a_long_scene_only_the_first_part_is_timed_and_the_same_of_every_engi
 def test_what_takes_long_has_three_rounds_and_leaves_the_others_to_the_rest(
     monkeypatch: pytest.MonkeyPatch,
 ):
-    """A median of fewer is none. The control: what is within its share has every round."""
     what = [
         Timed(("overhead", key, "", ""), partial(Spent, seconds), 1.0)
         for key, seconds in {"long": 2 * SHARE, "short": SHARE / 100}.items()
@@ -158,7 +147,6 @@ def test_what_takes_long_has_three_rounds_and_leaves_the_others_to_the_rest(
 
 
 def test_what_is_slow_has_the_cost_of_when_it_was_played():
-    """It is not run again: the pass is over before it could be. The control: what is quick is."""
     scene = scenario("near_miss")
     quick, slow = (
         CellToTime(key, "pymunk:matched", ENGINES["pymunk:matched"], scene, 1, seconds)
@@ -175,8 +163,6 @@ def test_what_is_slow_has_the_cost_of_when_it_was_played():
 
 
 def test_a_call_counts_once_for_many_steps_and_for_each_step_with_a_force():
-    """An empty step of 1, of 5 by itself: in free flight one call has 4 more, with a force every
-    step has."""
     free, thrusted = scenario("near_miss"), scenario("body_frame_thrust")
     steps = free.intervals * 2
     on = sum(thrust.stop - thrust.start for thrust in thrusted.thrusts) / thrusted.dt(1)
@@ -188,8 +174,6 @@ def test_a_call_counts_once_for_many_steps_and_for_each_step_with_a_force():
 
 
 def test_a_clock_that_reads_an_engine_otherwise_the_second_time_is_busy():
-    """Half of the pairs are off by 12 %: busy; by 8 %: not; no pair: not known, so busy."""
-
     def with_pairs(*ratios: float) -> RunResults:
         lines = [
             {"timing": str(k), "copy": copy, "cost": [cost]}
@@ -205,7 +189,6 @@ def test_a_clock_that_reads_an_engine_otherwise_the_second_time_is_busy():
 
 
 def test_what_an_engine_refuses_is_left_out_and_not_the_rest(monkeypatch: pytest.MonkeyPatch):
-    """An engine that takes no world in which nothing moves is timed all the same."""
     refusing = timing_pass.CellToTime(
         "key", "pymunk:matched", ENGINES["pymunk:matched"], scenario("near_miss"), 1, 0.0
     )

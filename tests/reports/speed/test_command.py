@@ -12,7 +12,7 @@ import pytest
 
 from crosscheck2d.adapters.engines import read_row
 from crosscheck2d.reports.compare.pooling import POOLED
-from crosscheck2d.reports.run.machine import about
+from crosscheck2d.reports.run.cells import about
 from crosscheck2d.reports.run.store import writing
 from crosscheck2d.reports.speed import ladder, measure
 from crosscheck2d.reports.speed.command import SPEED, kept_of

@@ -21,7 +21,7 @@ from crosscheck2d.reports.compare.comparison import compare
 from crosscheck2d.reports.compare.pareto import ACCURACIES, FAILED, UNREACHABLE
 from crosscheck2d.reports.compare.pooling import said_of_pool
 from crosscheck2d.reports.run.arguments import opening
-from crosscheck2d.reports.run.machine import about
+from crosscheck2d.reports.run.cells import about
 from crosscheck2d.reports.speed import figures
 from crosscheck2d.reports.speed.budget import budget_of, cut_scenes
 from crosscheck2d.reports.speed.command import SPEED, write_all

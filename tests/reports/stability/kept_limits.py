@@ -10,6 +10,7 @@ from __future__ import annotations
 import csv
 import sys
 from collections.abc import Iterable, Sequence
+from functools import cache
 from io import StringIO
 from math import inf, nan
 from pathlib import Path
@@ -18,7 +19,7 @@ from typing import NamedTuple
 from crosscheck2d.adapters.engines import FETCHED
 from crosscheck2d.reports.page import style
 from crosscheck2d.reports.stability.cases import CASES
-from crosscheck2d.reports.stability.limits import ONLY_BEYOND, Limit, engines_of
+from crosscheck2d.reports.stability.limits import ONLY_BEYOND, QUICK, Limit, LimitSearch, engines_of
 
 DATA = Path(__file__).parents[3] / "tests" / "data"
 FILE = DATA / "stability_limits.csv"
@@ -43,9 +44,6 @@ COLUMNS = (
 
 
 class Kept(NamedTuple):
-    """A row of the file: case, engine, form, what failed, verdict, where it works and fails, its
-    reason and how that was tested."""
-
     case: str
     engine: str
     form: str
@@ -58,8 +56,18 @@ class Kept(NamedTuple):
     tested: str
 
 
+@cache
+def quick_search(case: str, engine: str) -> tuple[LimitSearch, Limit]:
+    """The search for a limit in the quick form, which remembers the failing run, and the limit."""
+    search = LimitSearch(CASES[case], engine, QUICK)
+    return search, search.limit()
+
+
+def quick_limit(case: str, engine: str) -> Limit:
+    return quick_search(case, engine)[1]
+
+
 def kept(file: Path = FILE) -> list[Kept]:
-    """The file's rows."""
     return [
         Kept(
             row["case"],
@@ -78,8 +86,7 @@ def kept(file: Path = FILE) -> list[Kept]:
 
 
 def rows_of(path: Path) -> list[dict[str, str]]:
-    """The rows of a limits.csv; raises `ValueError` if a row has not one field for each column,
-    as after a comma that is not in quotes."""
+    """The rows of a limits.csv; raises `ValueError` where fields and columns differ in number."""
     with path.open(newline="", encoding="utf-8") as file:
         header, *rows = csv.reader(file)
     for number, row in enumerate(rows, start=2):
@@ -92,34 +99,27 @@ def rows_of(path: Path) -> list[dict[str, str]]:
 
 
 def engine_of(row: dict[str, str]) -> str:
-    """engine:profile."""
     return f"{row['engine']}:{row['profile']}"
 
 
 def number(text: str) -> float:
-    """A number, or nan for nothing."""
     return float(text) if text else nan
 
 
 def reaches(limit: Kept | Limit) -> tuple[float, float]:
-    """The bracket on a line on which harsher is larger: from what works to what fails; open where
-    nothing does.
-
-    What works only beyond a limit fails on the mild side of it: its line runs the other way.
-    """
+    # The bracket on a line on which harsher is larger: from what works to what fails; open where
+    # nothing does. What works only beyond a limit fails on the mild side of it: its line runs the
+    # other way.
     harsher = CASES[limit.case].harsher * (-1 if limit.verdict == ONLY_BEYOND else 1)
     works = -inf if limit.works_at != limit.works_at else harsher * limit.works_at
     fails = inf if limit.fails_at != limit.fails_at else harsher * limit.fails_at
     return works, fails
 
 
-def agrees(one: Kept | Limit, other: Kept | Limit) -> bool:
-    """Whether two searches found the same: the same verdict, and brackets that meet.
-
-    What did not fail as far as one went may fail beyond in the other.
-    """
-    (works, fails), (works_too, fails_too) = reaches(one), reaches(other)
-    backwards = [limit.verdict == ONLY_BEYOND for limit in (one, other)]
+def agrees(limit: Kept | Limit, kept: Kept | Limit) -> bool:
+    """The same verdict, and brackets that meet: what did not fail may fail beyond in the other."""
+    (works, fails), (works_too, fails_too) = reaches(limit), reaches(kept)
+    backwards = [row.verdict == ONLY_BEYOND for row in (limit, kept)]
     return backwards[0] == backwards[1] and max(works, works_too) <= min(fails, fails_too)
 
 
@@ -146,8 +146,6 @@ VARIANTS = (
 
 
 def readme_table(engines: Sequence[str], rows: Sequence[Kept]) -> str:
-    """A table of reports/stability/README.md: where engines fail; a dash: not as far as was
-    tried."""
     found = {(row.case, row.engine): row for row in rows}
     heads = [engine.replace(":", "<br>") for engine in engines]
     lines = [f"| fails at | {' | '.join(heads)} |", "|---|" + "---|" * len(engines)]
@@ -158,8 +156,8 @@ def readme_table(engines: Sequence[str], rows: Sequence[Kept]) -> str:
 
 
 def in_words(row: Kept) -> str:
-    """Where it fails first, to two digits; * where it works again beyond. A spin to three: what is
-    2 % off and what is refused at the cap itself are two limits."""
+    # Where it fails first, to two digits; * where it works again beyond. A spin to three: what is 2
+    # % off and what is refused at the cap itself are two limits.
     where = style.number(row.fails_at, 3 if row.case == "spin" else 2)
     refused = "refused from " if row.predicate == "refused" else ""
     words = {"does not fail": "–", "never works": "everywhere"}.get(row.verdict, refused + where)
@@ -167,8 +165,6 @@ def in_words(row: Kept) -> str:
 
 
 def keep(folder: Path) -> None:
-    """Put the limits of a folder's stability report in its full form into the file, in the order of
-    cases and engines."""
     found = rows_of(folder / "limits.csv")
     if not found or {row["form"] for row in found} != {"full"}:
         raise SystemExit(
@@ -188,7 +184,6 @@ def keep(folder: Path) -> None:
 
 
 def text_of(rows: Iterable[dict[str, str]]) -> str:
-    """The text of a file of kept limits with these rows of a limits.csv."""
     text = StringIO()
     writer = csv.DictWriter(text, COLUMNS, extrasaction="ignore", lineterminator="\n")
     writer.writeheader()

@@ -4,7 +4,6 @@ has the cause, else not."""
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 from typing import Any
 
 import pytest
@@ -23,22 +22,22 @@ from crosscheck2d.adapters.mechanisms.table import (
 from crosscheck2d.reports.compare.causes import (
     ACTS_AT_END,
     LATE,
-    Cause,
     by_mechanisms,
     mechanism_words,
 )
 from crosscheck2d.reports.stability.cases import CASES
 from crosscheck2d.reports.stability.explain import Ablations, explained, sufficient_mechanisms
-from crosscheck2d.reports.stability.limits import QUICK, Limit, LimitSearch, Trial
-from crosscheck2d.reports.stability.variants import DRIVEN_ENGINES, DrivenEngine, play_as
+from crosscheck2d.reports.stability.limits import (
+    DRIVEN_ENGINES,
+    QUICK,
+    DrivenEngine,
+    Limit,
+    LimitSearch,
+    Trial,
+    play_as,
+)
 from crosscheck2d.scenarios.catalogue import scenario
-
-
-@cache
-def found(case: str, engine: str) -> tuple[LimitSearch, Limit]:
-    """The limit of an engine, and the search that remembers its failing run."""
-    search = LimitSearch(CASES[case], engine, QUICK)
-    return search, search.limit()
+from tests.reports.stability.kept_limits import quick_search
 
 
 @pytest.mark.parametrize(
@@ -62,14 +61,11 @@ def found(case: str, engine: str) -> tuple[LimitSearch, Limit]:
     ],
 )
 def test_what_is_known_to_be_the_cause_comes_out_alone(case: str, engine: str, mechanisms: str):
-    """Mechanisms with a closed form or a setting of their own."""
-    assert sufficient_mechanisms(*found(case, engine)) == (mechanisms,)
+    assert sufficient_mechanisms(*quick_search(case, engine)) == (mechanisms,)
 
 
 def test_an_ablation_without_the_cause_does_not_have_the_limit():
-    """Negative control: neither end-of-step detection alone, nor all of the engine's mechanisms but
-    the threshold."""
-    search, limit = found("slow_collision", "box2d:shipped")
+    search, limit = quick_search("slow_collision", "box2d:shipped")
     ablations = Ablations.of(search, limit)
     assert ablations is not None
     others = [mechanism for mechanism in ablations.mechanisms if mechanism.name != RESTITUTION]
@@ -81,8 +77,7 @@ def test_an_ablation_without_the_cause_does_not_have_the_limit():
 
 
 def test_a_cause_that_no_mechanism_names_gives_no_ablation(monkeypatch: pytest.MonkeyPatch):
-    """pymunk with a bug of its own, half of every elasticity, under the name of one that has
-    none."""
+    # pymunk with a bug of its own, half of every elasticity, under the name of one that has none.
 
     def halved() -> Any:
         engine = ENGINES["pymunk:matched"].make()
@@ -99,8 +94,7 @@ def test_a_cause_that_no_mechanism_names_gives_no_ablation(monkeypatch: pytest.M
 
 
 def test_where_an_engine_works_nowhere_an_ablation_must_read_as_much_as_it_does():
-    """Failing anywhere proves nothing of one that fails everywhere: its number has to come out."""
-    search, limit = found("dt_wall_to_wall", "pymunk:shipped")
+    search, limit = quick_search("dt_wall_to_wall", "pymunk:shipped")
     ablations = Ablations.of(search, limit)
     assert ablations is not None
     far = replace(ablations, verdict=replace(ablations.verdict, value=3 * ablations.verdict.value))
@@ -112,28 +106,16 @@ def test_where_an_engine_works_nowhere_an_ablation_must_read_as_much_as_it_does(
 
 @pytest.mark.parametrize("engine", ["reference:ordered", "event_driven:float64"])
 def test_of_an_engine_whose_mechanisms_nobody_knows_there_is_no_ablation(engine: str):
-    """End-of-step detection explains nothing in an engine that orders its collisions within the
-    step."""
     search = LimitSearch(CASES["overlap_recovery"], engine, QUICK)
     assert sufficient_mechanisms(search, search.limit()) == ()
 
 
-def causes(limits: list[Limit]) -> list[Cause]:
-    """Their causes."""
-    return [limit.cause for limit in explained(limits) if limit.cause is not None]
-
-
 def test_a_written_reason_that_speaks_of_something_else_gives_way_to_the_ablation():
-    """And where it speaks of what the ablation has, it stays, and says how it was tested."""
     failing = Trial(10.0, 1, 1, 2.0, 0)
     limit = Limit("column", "pymunk:matched", "quick", "limit", 5.0, 10.0, (failing,))
-    [kept, other, untested] = causes(
-        [
-            replace(limit, mechanisms=(FLIGHT, POSITION_CORRECTION)),
-            replace(limit, mechanisms=(FRICTION,)),
-            limit,
-        ]
-    )
+    mechanisms = (FLIGHT, POSITION_CORRECTION), (FRICTION,), ()
+    limits = explained([replace(limit, mechanisms=names) for names in mechanisms])
+    [kept, other, untested] = [limit.cause for limit in limits]
 
     assert "corrected by a share per step" in kept.text
     assert (
@@ -148,7 +130,6 @@ def test_a_written_reason_that_speaks_of_something_else_gives_way_to_the_ablatio
 
 @pytest.mark.parametrize("engine", [name for name in MECHANISMS if name in ENGINES])
 def test_every_mechanism_has_words(engine: str):
-    """All of an engine's that the reference has."""
     one = scenario("head_on_equal_e09")
     settings = play_as(engine, replace(one, substeps=(4,))).settings
     names = [
@@ -166,7 +147,6 @@ def test_every_mechanism_has_words(engine: str):
 
 @pytest.mark.parametrize("engine", [*MECHANISMS, "new:plain"])
 def test_every_name_of_a_mechanism_has_words(engine: str):
-    """Whatever engine has it, fetched or new; a name that is none has none."""
     for name in NAMES:
         assert mechanism_words(name, engine)[2:] != ("", "")
     both = by_mechanisms([RESTITUTION, RECYCLING], engine).text

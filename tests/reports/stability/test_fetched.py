@@ -3,7 +3,6 @@ tests are skipped."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import pi
 from pathlib import Path
 
@@ -13,9 +12,13 @@ import pytest
 from crosscheck2d.adapters.engines import ENGINES, FETCHED
 from crosscheck2d.adapters.npm_packages import missing
 from crosscheck2d.reports.stability.cases import CASES
-from crosscheck2d.reports.stability.limits import QUICK, Limit, LimitSearch
+from crosscheck2d.reports.stability.limits import (
+    DRIVEN_ENGINES,
+    QUICK,
+    LimitSearch,
+    taking_part,
+)
 from crosscheck2d.reports.stability.results import StabilityPlan, Task
-from crosscheck2d.reports.stability.variants import DRIVEN_ENGINES, taking_part
 from tests.reports.stability.kept_limits import FILE_OF_FETCHED, Kept, agrees, kept
 from tests.reports.terminal.command_line import crosscheck
 
@@ -25,7 +28,6 @@ SHIPPED = [name for name in FETCHED if name.endswith(":shipped")]
 
 
 def test_planck_is_driven_to_its_threshold():
-    """It works above 1 m/s and fails below it; matched it has none; afterwards both are gone."""
     works = {}
     names = ("planck:shipped", "planck:matched")
     with taking_part({name: FETCHED[name] for name in names}):
@@ -38,7 +40,6 @@ def test_planck_is_driven_to_its_threshold():
 
 
 def test_a_report_of_a_package_names_its_version_and_no_file():
-    """So that another version is not taken for what an interrupted run finished."""
     with taking_part({"planck:shipped": FETCHED["planck:shipped"]}):
         plan = StabilityPlan(["spin"], ["planck:shipped"], "quick")
         alone = StabilityPlan(["spin"], ["pymunk:matched"], "quick")
@@ -47,30 +48,16 @@ def test_a_report_of_a_package_names_its_version_and_no_file():
         assert (list(plan.added), list(alone.added)) == (["planck:shipped"], [])
 
 
-def found(cases: Sequence[str], engines: Sequence[str]) -> dict[tuple[str, str], Limit]:
-    """The limits that a worker finds."""
-    added = {name: FETCHED[name] for name in engines}
-    limits = {}
-    for case in cases:
-        for name in engines:
-            limit = Task(case, name, "quick")(added)
-            assert isinstance(limit, Limit)
-            limits[case, name] = limit
-    return limits
-
-
-KEPT = kept(FILE_OF_FETCHED)
 FAST = ("tunnelling_head_on", "slow_collision", "far_from_origin")
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "row",
-    [row for row in KEPT if row.case in FAST],
+    [row for row in kept(FILE_OF_FETCHED) if row.case in FAST],
     ids=lambda row: f"{row.case}-{row.engine}",
 )
 def test_the_quick_form_finds_the_kept_limit_of_the_full_one(row: Kept):
-    """Of the cases that take less than a second."""
     with taking_part({row.engine: FETCHED[row.engine]}):
         found = LimitSearch(CASES[row.case], row.engine, QUICK).limit()
 
@@ -79,21 +66,19 @@ def test_the_quick_form_finds_the_kept_limit_of_the_full_one(row: Kept):
 
 @pytest.mark.slow
 def test_what_cuts_a_spin_is_its_limit():
-    """A quarter of a turn a step in planck, an eighth in Rapier, 2 % of which is off; matched
-    planck cuts none, matched Rapier refuses."""
     names = ("planck:shipped", "planck:matched", "rapier2d:shipped", "rapier2d:matched")
-    limits = found(["spin"], names)
+    added = {name: FETCHED[name] for name in names}
+    limits = {name: Task("spin", name, "quick").run(added) for name in names}
     bracket = 1.05  # that of the quick form
     for name, cut in (("planck:shipped", pi / 2), ("rapier2d:shipped", pi / 4)):
-        limit = limits["spin", name]
+        limit = limits[name]
         assert limit.works_at / bracket <= cut / 0.98 <= limit.fails_at * bracket
-    assert limits["spin", "planck:matched"].verdict == "does not fail"
-    assert limits["spin", "rapier2d:matched"].failing.broken == "refused"
+    assert limits["planck:matched"].verdict == "does not fail"
+    assert limits["rapier2d:matched"].failing.broken == "refused"
 
 
 @pytest.mark.slow
 def test_the_command_drives_all_of_them_to_their_limits(tmp_path: Path):
-    """A case, a map and a law of touching disks; each failure is a row with a reason."""
     words = [word for name in SHIPPED for word in ("--engine", name)]
     asked = ("spin", "slow_collision", "dt_and_speed", "touching_break")
     done = crosscheck("stability", *asked, *words, "--out", "limits", cwd=tmp_path)

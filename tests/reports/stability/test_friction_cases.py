@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 from math import pi, sqrt
 
 import numpy as np
@@ -19,38 +18,36 @@ from crosscheck2d.adapters.mechanisms.table import (
 from crosscheck2d.adapters.play import play
 from crosscheck2d.reports.lessons.lesson import run_of
 from crosscheck2d.reports.stability.cases import CASES
+from crosscheck2d.reports.stability.cases_few import phase
 from crosscheck2d.reports.stability.cases_friction import (
-    DT,
+    BOUNCE_DT,
     FALL,
     FRICTION,
     PHASES,
     in_corner,
     rough_bounce,
 )
-from crosscheck2d.reports.stability.limits import NEVER_FAILS, QUICK, Limit, LimitSearch, engines_of
+from crosscheck2d.reports.stability.limits import (
+    NEVER_FAILS,
+    QUICK,
+    LimitSearch,
+    engines_of,
+    play_as,
+)
 from crosscheck2d.reports.stability.overview import findings
 from crosscheck2d.reports.stability.predicates import judge, truth_of
-from crosscheck2d.reports.stability.scenes import phase
-from crosscheck2d.reports.stability.variants import play_as
+from tests.reports.stability.kept_limits import quick_limit
 
 MATCHED = ("pymunk:matched", "box2d:matched", "box2d_v3:matched")
 REFUSE = ("reference:exercise", "reference:lesson")
 
 
-@cache
-def limit(case: str, engine: str) -> Limit:
-    """The limit in the quick form."""
-    return LimitSearch(CASES[case], engine, QUICK).limit()
-
-
 def bracket(case: str, engine: str) -> tuple[float, float]:
-    """From the lower to the higher end."""
-    low, high = sorted((limit(case, engine).works_at, limit(case, engine).fails_at))
+    low, high = sorted((quick_limit(case, engine).works_at, quick_limit(case, engine).fails_at))
     return low, high
 
 
 def test_only_a_case_that_names_it_is_played_by_what_only_adds_friction():
-    """`reference:coulomb` plays all of these cases, and no other; asked for by a plan, too."""
     mine = {case.name for case in FRICTION}
 
     assert len(mine) >= 6
@@ -62,8 +59,6 @@ def test_only_a_case_that_names_it_is_played_by_what_only_adds_friction():
 
 
 def test_the_exact_answer_of_every_case_holds_to_the_end_of_the_run():
-    """Its horizon is later; and what it says is what the event engine plays, which shares no code
-    with it. In a corner that refuses."""
     for case in FRICTION:
         scenario = case.scene(case.values[1], 1)
         assert truth_of(scenario).horizon >= scenario.duration
@@ -73,20 +68,20 @@ def test_the_exact_answer_of_every_case_holds_to_the_end_of_the_run():
 
 
 def test_friction_without_the_restitution_is_seen_in_box2d_3_1_alone():
-    """It gives 1 / (1 + e) of the friction, nine tenths at e = 1/9, or sooner by what its lever arm
-    is off, half of 0.05 radii of overlap; as shipped it never gives enough in every phase."""
+    # It gives 1 / (1 + e) of the friction, nine tenths at e = 1/9, or sooner by what its lever arm
+    # is off, half of 0.05 radii of overlap; as shipped it never gives enough in every phase.
     low, high = bracket("friction_in_bounce", "box2d_v3:matched")
     assert (1 - 0.025) / 0.9 - 1 < low < high < 1 / 9
-    assert limit("friction_in_bounce", "box2d_v3:shipped").verdict == "never works"
+    assert quick_limit("friction_in_bounce", "box2d_v3:shipped").verdict == "never works"
     for engine in ("pymunk:matched", "box2d:shipped", "box2d:matched", "reference:coulomb"):
-        assert limit("friction_in_bounce", engine).verdict == NEVER_FAILS
+        assert quick_limit("friction_in_bounce", engine).verdict == NEVER_FAILS
 
 
 @pytest.mark.parametrize(("margin", "late"), [(0.02, 4), (0.01, 0)])
 def test_a_contact_that_is_foreseen_for_a_whole_step_takes_less_friction(margin: float, late: int):
-    """Box2D 3.1 as shipped gives m v (1 - 4 gap / (v dt)) before restitution where a step ends with
-    a gap that one of its four substeps would close, which is a quarter of the phases. The ablated
-    reference does so, too, but not with a margin below the 12.5 mm that a step moves the disk."""
+    # Box2D 3.1 as shipped gives m v (1 - 4 gap / (v dt)) before restitution where a step ends with
+    # a gap that one of its four substeps would close, which is a quarter of the phases. The ablated
+    # reference does so, too, but not with a margin below the 12.5 mm that a step moves the disk.
     mu, shares, law = 0.1, [], []
     for run in range(PHASES):
         scenario = rough_bounce(8.0, run, e=0.5, mu=mu)
@@ -96,7 +91,7 @@ def test_a_contact_that_is_foreseen_for_a_whole_step_takes_less_friction(margin:
         played = play(on, "reference:ablated", scenario, dt).trajectory
         assert played is not None
         shares.append(-float(np.diff(played.velocity[[0, -1], 0, 0])[0]) / (mu * FALL))
-        gap = phase(run) if margin > FALL * DT * (1 + phase(run)) else 1.0
+        gap = phase(run) if margin > FALL * BOUNCE_DT * (1 + phase(run)) else 1.0
         law.append(1 - 4 * gap if gap < 0.25 else 1.0)
         if margin == 0.02:
             assert shipped.trajectory is not None
@@ -109,29 +104,29 @@ def test_a_contact_that_is_foreseen_for_a_whole_step_takes_less_friction(margin:
 
 
 def test_a_product_of_frictions_is_seen_in_pymunk_as_shipped_alone():
-    """mu2 for mu: it rolls up to tan(angle) = 3 mu2, a quarter of 3 mu; it stops a slip of 3 m/s,
-    to a tenth, from mu2 (1 + e2) v = 0.9 m/s on."""
+    # mu2 for mu: it rolls up to tan(angle) = 3 mu2, a quarter of 3 mu; it stops a slip of 3 m/s, to
+    # a tenth, from mu2 (1 + e2) v = 0.9 m/s on.
     low, high = bracket("critical_slope", "pymunk:shipped")
     assert low < 0.75 < high * 1.01  # and may slip by 5 %
     low, high = bracket("strong_friction", "pymunk:shipped")
     assert low < sqrt(0.9 / 1.25 / FALL) < high
     for case in ("critical_slope", "strong_friction"):
-        assert all(limit(case, engine).verdict == NEVER_FAILS for engine in MATCHED)
+        assert all(quick_limit(case, engine).verdict == NEVER_FAILS for engine in MATCHED)
 
 
 @pytest.mark.parametrize(("box", "cap"), [("box2d", pi / 2), ("box2d_v3", pi / 4)])
 def test_the_caps_on_spin_end_rolling_and_spin_in_a_bounce(box: str, cap: float):
-    """A disk comes to roll at 2/3 of its speed: at v dt / R = 3/2 of the cap."""
+    # A disk comes to roll at 2/3 of its speed: at v dt / R = 3/2 of the cap.
     low, high = bracket("spin_in_bounce", f"{box}:matched")
     assert low <= cap <= high
     low, high = bracket("slide_to_roll", f"{box}:matched")
     assert low <= 1.5 * cap <= high
-    assert limit("slide_to_roll", "pymunk:matched").verdict == NEVER_FAILS
+    assert quick_limit("slide_to_roll", "pymunk:matched").verdict == NEVER_FAILS
 
 
 def test_a_disk_in_a_corner_creeps_where_each_contact_is_solved_once_a_step():
-    """0.07 radii in 100 steps of the exercise with friction; the control: if it leans on one wall
-    only, nothing creeps, and where contacts are solved together nothing does in the corner."""
+    # 0.07 radii in 100 steps of the exercise with friction; the control: if it leans on one wall
+    # only, nothing creeps, and where contacts are solved together nothing does in the corner.
     case, corner = CASES["creep_at_rest"], in_corner(100, 0)
     upright = replace(corner, scene=replace(corner.scene, gravity=np.array([0.0, -10.0])))
     creeping = judge(case.predicate, corner, play_as("reference:coulomb", corner))
@@ -142,18 +137,15 @@ def test_a_disk_in_a_corner_creeps_where_each_contact_is_solved_once_a_step():
 
 
 def test_what_models_no_friction_refuses_every_case():
-    """And says so."""
     for case in FRICTION:
         for engine in REFUSE:
-            failing = limit(case.name, engine).failing
+            failing = quick_limit(case.name, engine).failing
             assert failing is not None
             assert failing.broken == "refused"
             assert "does not model friction" in failing.event
 
 
 def test_a_little_less_friction_would_be_noticed():
-    """The negative control: a scene with nine tenths of the friction under the exact answer of the
-    case fails where the whole does not."""
     case = CASES["friction_in_bounce"]
 
     def less(x: float, run: int):
@@ -165,11 +157,10 @@ def test_a_little_less_friction_would_be_noticed():
 
 
 def test_who_fails_in_the_fewest_cases_is_said_of_those_with_friction_apart():
-    """Else what refuses them, and what plays in no others, would be called worst and best."""
     rough, smooth = ("critical_slope", "strong_friction"), ("spin", "scale_down")
     engines = ("reference:exercise", "reference:coulomb", "pymunk:shipped", "box2d:shipped")
     limits = [
-        limit(case, engine)
+        quick_limit(case, engine)
         for case in (*smooth, *rough)
         for engine in engines
         if engine in engines_of(CASES[case])
@@ -189,9 +180,8 @@ def test_who_fails_in_the_fewest_cases_is_said_of_those_with_friction_apart():
 
 
 def test_the_best_of_the_libraries_is_named_where_a_solver_of_this_project_is_better():
-    """Who asks which engine to take is not answered by the reference alone."""
     cases, engines = ("spin", "scale_down"), ("reference:exercise", "box2d:shipped")
-    limits = [limit(case, engine) for case in cases for engine in engines]
+    limits = [quick_limit(case, engine) for case in cases for engine in engines]
     (said,) = (one for one in findings(limits) if "fewest failures" in one)
 
     assert said.endswith("Of the libraries, the fewest are those of box2d:shipped (2).")

@@ -12,11 +12,12 @@ import pytest
 from crosscheck2d.adapters.engines import changed
 from crosscheck2d.adapters.play import play
 from crosscheck2d.adapters.pymunk import Pymunk
+from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.compare import laws
-from crosscheck2d.reports.stability import variants
+from crosscheck2d.reports.stability import limits
 from crosscheck2d.reports.stability.cases import CASES
-from crosscheck2d.reports.stability.cases_gas import RADIUS, gas, wrapped_run
-from crosscheck2d.reports.stability.limits import QUICK, LimitSearch
+from crosscheck2d.reports.stability.cases_many import RADIUS, gas, wrapped_run
+from crosscheck2d.reports.stability.limits import QUICK, DrivenEngine, LimitSearch, play_as
 from crosscheck2d.reports.stability.predicates import judge
 from crosscheck2d.reports.stability.predicates_gas import (
     BLOCKS,
@@ -32,16 +33,13 @@ from crosscheck2d.reports.stability.predicates_gas import (
     literature,
     shares_of_speeds,
 )
-from crosscheck2d.reports.stability.variants import DrivenEngine, play_as
 from crosscheck2d.scenarios.catalogue import SCENARIOS
 from crosscheck2d.scenarios.model import Scenario, Trajectory, frozen
 
 EXACT = "event_driven:float64"
-AT_END_AND_IN_ORDER = ("pymunk:matched", "reference:ordered")
 
 
 def played(engine: str, scenario: Scenario) -> Trajectory:
-    """The whole run."""
     run = play_as(engine, scenario)
     assert run.status == "ok"
     assert run.trajectory is not None
@@ -49,15 +47,21 @@ def played(engine: str, scenario: Scenario) -> Trajectory:
 
 
 def verdict(predicate, scenario: Scenario, trajectory: Trajectory):
-    """The reading of a trajectory as if somebody had played it."""
-    run = play_as(EXACT, replace(scenario, duration=scenario.sample_interval))
-    return judge(predicate, scenario, replace(run, trajectory=trajectory))
+    return judge(predicate, scenario, Run("made", "up", "gas", 1.0, trajectory=trajectory))
+
+
+def as_in_literature(scenario: Scenario, trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
+    """The rate of collisions and the pressure, in blocks, over those of the literature."""
+    expected, collisions = literature(scenario), trajectory.collisions
+    rate = counted(trajectory, collisions.j >= 0, np.ones(len(collisions)))
+    force = counted(trajectory, collisions.j < 0, collisions.impulse)
+    return rate / expected.rate, force / expected.force
 
 
 @pytest.mark.parametrize(("packing", "z"), [(0.1, 1.23614), (0.3, 2.06326), (0.5, 4.1063)])
 def test_the_virial_series_is_that_of_clisby_and_mccoy(packing: float, z: float):
-    """Their ten coefficients resummed; Henderson's (1 + eta2 / 8) / (1 - eta)2 is within 0.5 % up
-    to 0.5."""
+    # Their ten coefficients resummed; Henderson's (1 + eta2 / 8) / (1 - eta)2 is within 0.5 % up to
+    # 0.5.
     assert compressibility(packing) == pytest.approx(z, abs=1e-4)
     assert compressibility(packing) == pytest.approx(
         (1 + packing**2 / 8) / (1 - packing) ** 2, rel=5e-3
@@ -65,8 +69,8 @@ def test_the_virial_series_is_that_of_clisby_and_mccoy(packing: float, z: float)
 
 
 def test_in_a_large_box_the_rate_is_enskogs_and_the_pressure_that_of_the_bulk():
-    """4 / sqrt(pi) (Z - 1) sqrt(kT / m) / sigma collisions a disk; a wall of a million diameters is
-    no matter."""
+    # 4 / sqrt(pi) (Z - 1) sqrt(kT / m) / sigma collisions a disk; a wall of a million diameters is
+    # no matter.
     radius, packing, n = 0.5, 0.3, 10**12
     size = np.full(2, sqrt(n * pi * radius**2 / packing))
     found, z = gas_in_box(n, radius, size, 1.0), compressibility(packing)
@@ -77,42 +81,28 @@ def test_in_a_large_box_the_rate_is_enskogs_and_the_pressure_that_of_the_bulk():
 
 @pytest.mark.parametrize("packing", [0.2, 0.4, pytest.param(0.6, marks=pytest.mark.slow)])
 def test_an_exact_gas_between_walls_has_the_rate_and_the_pressure_of_the_literature(packing: float):
-    """Two gases of a hundred disks, within 1 % (scaled particle theory, corners) and four block
-    errors.
-
-    The negative control: the pressure of a bulk of the same packing, without a thought of walls, is
-    not within that.
-    """
-    rates, forces = [], []
-    for run in range(2):
-        scenario = gas(packing, run, rows=10, columns=10, steps=8000, every=80)
-        one, ought = played(EXACT, scenario), literature(scenario)
-        collisions = one.collisions
-        rates.append(counted(one, collisions.j >= 0, np.ones(len(collisions))) / ought.rate)
-        forces.append(counted(one, collisions.j < 0, collisions.impulse) / ought.force)
-    scene = scenario.scene
+    # Two gases of a hundred disks, within 1 % (scaled particle theory, corners) and four block
+    # errors. The negative control: the pressure of a bulk of the same packing, without a thought of
+    # walls, is not within that.
+    gases = [gas(packing, run, rows=10, columns=10, steps=8000, every=80) for run in range(2)]
+    runs = [as_in_literature(scenario, played(EXACT, scenario)) for scenario in gases]
+    rates, forces = (np.concatenate(blocks) for blocks in zip(*runs))
+    scene = gases[1].scene
     size = scene.walls.max(axis=(0, 1)) - scene.walls.min(axis=(0, 1))
     temperature = (scene.velocity**2).sum() / 2 / scene.n
-    bulk = (
-        compressibility(packing)
-        * packing
-        / (pi * RADIUS**2)
-        * temperature
-        * 2
-        * size.sum()
-        / ought.force
-    )
+    pressure = compressibility(packing) * packing / (pi * RADIUS**2) * temperature
+    bulk = pressure * 2 * size.sum() / literature(gases[1]).force
 
     def within(blocks: np.ndarray) -> bool:
         return abs(blocks.mean() - 1) < 0.01 + ERRORS * block_error(blocks)
 
-    assert within(np.concatenate(rates))
-    assert within(np.concatenate(forces))
-    assert not within(np.concatenate(forces) / bulk)
+    assert within(rates)
+    assert within(forces)
+    assert not within(forces / bulk)
 
 
 def test_an_exact_gas_passes_and_one_that_is_too_hot_does_not():
-    """All of it, for two seeds; a gas hotter by a fifth collides more often by a tenth."""
+    # All of it, for two seeds; a gas hotter by a fifth collides more often by a tenth.
     for run in range(2):
         scenario = CASES["thermometer"].scene(0.4, run)
         assert not judge(WRONG_GAS, scenario, play_as(EXACT, scenario)).failed
@@ -126,8 +116,6 @@ def test_an_exact_gas_passes_and_one_that_is_too_hot_does_not():
 
 
 def test_speeds_that_are_not_maxwells_are_noticed():
-    """All disks equally fast, and all as sampled: only the second has a fifth of them in each fifth
-    of the law."""
     rng, k, n = np.random.default_rng(0), 500, 100
     sampled = rng.normal(size=(k, n, 2))
     angle = rng.uniform(0, 2 * pi, (k, n))
@@ -145,15 +133,12 @@ def test_speeds_that_are_not_maxwells_are_noticed():
     assert shares["same"].max() == 1.0
     equal = one.velocity / np.linalg.norm(one.velocity, axis=2, keepdims=True)
     speed = np.linalg.norm(one.velocity[0], axis=1)
-    assert (
-        verdict(WRONG_GAS, scenario, replace(one, velocity=frozen(equal * speed.mean()))).id
-        == "not Maxwell"
-    )
+    alike = replace(one, velocity=frozen(equal * speed.mean()))
+    assert verdict(WRONG_GAS, scenario, alike).id == "not Maxwell"
 
 
 def test_equipartition_holds_in_an_exact_gas_up_to_1e4_and_a_hotter_kind_is_noticed():
-    """Block errors tell chance from heat: disks of twice the temperature fail, whatever their
-    mass."""
+    # Block errors tell chance from heat: disks of twice the temperature fail, whatever their mass.
     for ratio in (1.5, 100.0, 1e4):
         scenario = CASES["equipartition"].scene(ratio, 0)
         one = played(EXACT, scenario)
@@ -164,8 +149,8 @@ def test_equipartition_holds_in_an_exact_gas_up_to_1e4_and_a_hotter_kind_is_noti
 
 
 def test_without_walls_momentum_stays_to_rounding_in_every_engine_and_a_leak_is_noticed():
-    """float64 to 1e-14, float32 to 1e-6, in 1000 steps; one disk stopped at the end is one part in
-    some twenty."""
+    # float64 to 1e-14, float32 to 1e-6, in 1000 steps; one disk stopped at the end is one part in
+    # some twenty.
     scenario = wrapped_run(1000.0, 0)
     for engine, bound in (
         ("reference:exercise", 1e-14),
@@ -184,33 +169,27 @@ def test_without_walls_momentum_stays_to_rounding_in_every_engine_and_a_leak_is_
 
 @pytest.mark.slow
 def test_finding_collisions_late_costs_a_dense_gas_its_rate_and_its_pressure():
-    """At packing 0.6 an engine that detects at the end of a step and leaves overlaps has a tenth
-    too few collisions; in order within it, not. As pymunk is matched now, it removes an overlap
-    in a step, and loses less."""
-    scenario = CASES["thermometer"].scene(0.6, 0)
-    name, ordered = AT_END_AND_IN_ORDER
+    # At packing 0.6 an engine that detects at the end of a step and leaves overlaps has a tenth too
+    # few collisions; in order within it, not. As pymunk is matched now, it removes an overlap in a
+    # step, and loses less.
+    scenario, name = CASES["thermometer"].scene(0.6, 0), "pymunk:matched"
     leaving = DrivenEngine(name, lambda: changed(name, elastic_bias=1.0))
-    run = variants.played(leaving, scenario)
-    late, in_order = (judge(WRONG_GAS, scenario, it) for it in (run, play_as(ordered, scenario)))
-    ought, one = literature(scenario), run.trajectory
-    assert one is not None
-    collisions = one.collisions
-    rate = counted(one, collisions.j >= 0, np.ones(len(collisions))).mean() / ought.rate
-    pressure = counted(one, collisions.j < 0, collisions.impulse).mean() / ought.force
+    run = limits.played(leaving, scenario)
+    in_order = judge(WRONG_GAS, scenario, play_as("reference:ordered", scenario))
+    late = judge(WRONG_GAS, scenario, run)
+    assert run.trajectory is not None
 
-    assert rate == pytest.approx(0.9, abs=0.02)
-    assert pressure == pytest.approx(0.9, abs=0.02)
+    for blocks in as_in_literature(scenario, run.trajectory):
+        assert blocks.mean() == pytest.approx(0.9, abs=0.02)
     assert late.id in ("rate", "pressure")
     assert late.failed
     assert not in_order.failed
 
 
 def test_pymunk_loses_energy_by_impulses_that_a_contact_inherits():
-    """Shipped it remembers one for three steps: what it inherits is not given again, but may be
-    taken back.
-
-    Forgotten as soon as they part, contacts keep the energy but for what 50 iterations leave over.
-    """
+    # Shipped it remembers one for three steps: what it inherits is not given again, but may be
+    # taken back. Forgotten as soon as they part, contacts keep the energy but for what 50
+    # iterations leave over.
     scenario = CASES["fast_gas"].scene(0.6, 0)
     lost = {}
     for steps in (3, 1):
@@ -228,8 +207,8 @@ def test_pymunk_loses_energy_by_impulses_that_a_contact_inherits():
 def test_what_pymunk_tells_of_its_collisions_is_what_it_gives_only_if_it_forgets_contacts(
     profile: str,
 ):
-    """A heavy disk drives a light one against a wall: in all, impulses of twice the heavy one's
-    momentum, once each."""
+    # A heavy disk drives a light one against a wall: in all, impulses of twice the heavy one's
+    # momentum, once each.
     scenario = SCENARIOS["galperin_314"]()
     dt = scenario.dt(4)
     reported = {}
@@ -248,9 +227,6 @@ def test_what_pymunk_tells_of_its_collisions_is_what_it_gives_only_if_it_forgets
 @pytest.mark.long
 @pytest.mark.parametrize("engine", ["pymunk:shipped", "box2d:matched"])
 def test_the_limit_of_a_fast_gas_is_that_of_other_draws_too(engine: str):
-    """Sixteen other gases move it by less than a half; the first of them that fails comes at any
-    value."""
-
     def fails_at(seeds: int, by_chance: float) -> float:
         case = CASES["fast_gas"]
         other = replace(case, scene=lambda x, run: case.scene(x, run + seeds), by_chance=by_chance)

@@ -1,20 +1,21 @@
 """The quick form finds every limit of the full form again: a hidden failure, or another engine,
-shows up here."""
+shows up here. And what reports/stability/README.md says of limits is what the full form found."""
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from dataclasses import replace
-from functools import cache
 from math import isfinite, isnan
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from crosscheck2d.adapters.engines import ENGINES, UNASKED
+from crosscheck2d.adapters.engines import ENGINES, FETCHED, UNASKED
 from crosscheck2d.reports.stability.cases import CASES
 from crosscheck2d.reports.stability.limits import (
+    DRIVEN_ENGINES,
     FULL,
     NEVER_FAILS,
     QUICK,
@@ -22,20 +23,25 @@ from crosscheck2d.reports.stability.limits import (
     LimitSearch,
     engines_of,
 )
-from crosscheck2d.reports.stability.variants import DRIVEN_ENGINES
+from crosscheck2d.reports.stability.page import facts
 from tests.measured import MEASURED
 from tests.reports.stability.kept_limits import (
     FILE,
     FILE_OF_FETCHED,
+    IN_README,
+    VARIANTS,
     Kept,
     agrees,
     in_words,
     kept,
+    quick_limit,
     rows_of,
     text_of,
 )
 
 KEPT = kept()
+KEPT_LIMITS = {(row.case, row.engine): row for row in KEPT}
+THRESHOLD = KEPT_LIMITS["slow_collision", "box2d:shipped"]
 FAST = (
     "slow_collision",
     "scale_up",
@@ -68,28 +74,20 @@ CHANGED = (
 )
 
 
-@cache
-def quick(case: str, engine: str) -> Limit:
-    """Found here and now in the quick form."""
-    return LimitSearch(CASES[case], engine, QUICK).limit()
-
-
 def assert_agrees(row: Kept) -> None:
-    """The quick form's bracket holds the full form's limit: strict both ways."""
-    found = quick(row.case, row.engine)
-    assert agrees(found, row), (
-        f"{found.verdict}, {found.works_at} to {found.fails_at}, for {row}: {CHANGED}"
+    limit = quick_limit(row.case, row.engine)
+    assert agrees(limit, row), (
+        f"{limit.verdict}, {limit.works_at} to {limit.fails_at}, for {row}: {CHANGED}"
     )
 
 
 def name_of(row: Kept) -> str:
-    """As a test is called."""
     return f"{row.case}-{row.engine}"
 
 
 def some_of(rows: list[Kept]) -> list[Any]:
-    """Every twentieth is for the gate, the others are for the long run; begun where none of them is
-    a gas of a million steps, which takes 8 s."""
+    # Every twentieth is for the gate, the others are for the long run; begun where none of them is
+    # a gas of a million steps, which takes 8 s.
     return [
         pytest.param(row, marks=[] if k % 20 == 15 else [pytest.mark.long])
         for k, row in enumerate(rows)
@@ -98,14 +96,12 @@ def some_of(rows: list[Kept]) -> list[Any]:
 
 @pytest.mark.parametrize("row", SOME, ids=name_of)
 def test_the_quick_form_finds_the_limit_of_the_full_one(row: Kept):
-    """Of the cases that take a tenth of a second."""
     assert_agrees(row)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("row", some_of(SEARCHED), ids=name_of)
 def test_the_quick_form_finds_a_limit_of_the_full_one_in_every_case(row: Kept):
-    """The suite's own scenes among them."""
     assert_agrees(row)
 
 
@@ -118,18 +114,14 @@ SEARCHABLE = {
 
 
 def test_every_case_and_every_engine_is_searched():
-    """In the fast or in the long test."""
     assert {row.case for row in (*SOME, *SEARCHED)} == set(CASES)
     assert {row.engine for row in (*SOME, *SEARCHED)} == SEARCHABLE
 
 
 def wrong_ends(row: Kept) -> list[float]:
-    """Where it fails though it is said to work, and works though it is said to fail: there and a
-    hundredth away from the edge.
-
-    The file keeps six digits, and which bounce comes too low may hang on the seventh; a hundredth
-    is the width of a bracket of the full form.
-    """
+    # Where it fails though it is said to work, and works though it is said to fail: there and a
+    # hundredth away from the edge. The file keeps six digits, and which bounce comes too low may
+    # hang on the seventh; a hundredth is the width of a bracket of the full form.
     search = LimitSearch(CASES[row.case], row.engine, QUICK)
     away = FULL.ratio if row.fails_at > row.works_at else 1 / FULL.ratio
     ends = [(row.works_at, True, 1 / away), (row.fails_at, False, away)]
@@ -144,24 +136,21 @@ def wrong_ends(row: Kept) -> list[float]:
 @pytest.mark.slow
 @pytest.mark.parametrize("row", some_of([row for row in REST if row not in SEARCHED]), ids=name_of)
 def test_a_limit_of_the_full_form_works_and_fails_where_it_says(row: Kept):
-    """All phases of the last value that works and the first one that fails."""
     assert wrong_ends(row) == []
+
+
+def moved(limit: Any, factor: float) -> dict[str, float]:
+    return {"works_at": limit.works_at * factor, "fails_at": limit.fails_at * factor}
 
 
 def test_an_end_that_has_moved_is_noticed():
-    """The negative control: a limit that is said to lie a twentieth further out, or nearer."""
-    row = next(row for row in KEPT if (row.case, row.engine) == ("slow_collision", "box2d:shipped"))
-    moved = [
-        row._replace(works_at=row.works_at * factor, fails_at=row.fails_at * factor)
-        for factor in (0.95, 1.05)
-    ]
+    off = [THRESHOLD._replace(**moved(THRESHOLD, factor)) for factor in (0.95, 1.05)]
 
-    assert wrong_ends(row) == []
-    assert [len(wrong_ends(one)) for one in moved] == [1, 1]
+    assert wrong_ends(THRESHOLD) == []
+    assert [len(wrong_ends(row)) for row in off] == [1, 1]
 
 
 def test_every_case_and_engine_is_kept():
-    """None is left out."""
     asked = {
         (name, engine)
         for name, case in CASES.items()
@@ -174,7 +163,6 @@ def test_every_case_and_engine_is_kept():
 
 
 def test_every_limit_has_a_reason_and_an_untested_one_is_called_likely():
-    """A limit without a sentence on why would be a number to wonder at."""
     for row in KEPT:
         if row.verdict == NEVER_FAILS:
             assert row.reason == ""
@@ -186,12 +174,10 @@ def test_every_limit_has_a_reason_and_an_untested_one_is_called_likely():
 
 @pytest.mark.parametrize("file", [FILE, FILE_OF_FETCHED], ids=lambda file: file.stem)
 def test_the_kept_limits_are_as_they_are_written(file: Path):
-    """Byte for byte, so that an edit by hand leaves a text with a comma in its quotes."""
     assert text_of(rows_of(file)).encode() == file.read_bytes()
 
 
 def test_a_comma_that_is_not_in_quotes_is_refused(tmp_path: Path):
-    """The negative control: read as two fields, the rest of the reason would stand for its test."""
     damaged = tmp_path / "limits.csv"
     text = FILE.read_text("utf-8")
     row = next(k for k, line in enumerate(text.splitlines(), start=1) if '"explicit' in line)
@@ -203,23 +189,17 @@ def test_a_comma_that_is_not_in_quotes_is_refused(tmp_path: Path):
 
 @pytest.mark.parametrize("factor", [0.8, 1.25])
 def test_an_engine_that_fails_earlier_or_later_is_noticed(factor: float):
-    """The negative control: a limit moved by a quarter either way, and one that is gone."""
-    row = next(row for row in KEPT if (row.case, row.engine) == ("slow_collision", "box2d:shipped"))
-    now = quick(row.case, row.engine)
+    now = quick_limit(THRESHOLD.case, THRESHOLD.engine)
 
-    assert agrees(now, row)
-    assert not agrees(
-        replace(now, works_at=now.works_at * factor, fails_at=now.fails_at * factor), row
-    )
-    assert not agrees(quick(row.case, "reference:exercise"), row)
+    assert agrees(now, THRESHOLD)
+    assert not agrees(replace(now, **moved(now, factor)), THRESHOLD)
+    assert not agrees(quick_limit(THRESHOLD.case, "reference:exercise"), THRESHOLD)
 
 
 def test_a_scan_that_steps_over_the_first_failures_does_not_agree():
-    """The negative control: the scan as it was once, few heights of the ball and few values, called
-    0.057 a limit."""
-    row = next(
-        row for row in KEPT if (row.case, row.engine) == ("bounce_drift", "reference:exercise")
-    )
+    # The negative control: the scan as it was once, few heights of the ball and few values, called
+    # 0.057 a limit.
+    row = KEPT_LIMITS["bounce_drift", "reference:exercise"]
     flattering = Limit(row.case, row.engine, "quick", "limit", 0.0545, 0.0572, ())
 
     assert not agrees(flattering, row)
@@ -235,13 +215,10 @@ def test_a_scan_that_steps_over_the_first_failures_does_not_agree():
     ],
 )
 def test_a_limit_is_the_first_failure_between_the_values_scanned_as_well(engine: str):
-    """At values, heights and phases that no form has played, the ball comes back wherever it is
-    said to.
-
-    Each of these loses or gains up to |v| dt of height a bounce, 2 dt over the fall time: 1 % from
-    0.005 on.
-    """
-    found = quick("bounce_drift", engine)
+    # At values, heights and phases that no form has played, the ball comes back wherever it is said
+    # to. Each of these loses or gains up to |v| dt of height a bounce, 2 dt over the fall time: 1 %
+    # from 0.005 on.
+    found = quick_limit("bounce_drift", engine)
     case = CASES["bounce_drift"]
     others = [0.0021, 0.0026, 0.0034, 0.0039, 0.0043, 0.0046]
     search = LimitSearch(
@@ -254,10 +231,70 @@ def test_a_limit_is_the_first_failure_between_the_values_scanned_as_well(engine:
 
 
 def test_a_limit_that_is_not_the_only_edge_is_marked():
-    """In a table the first failure, and a star."""
-    row = next(
-        row for row in KEPT if row.case == "slow_collision" and row.engine == "box2d:shipped"
-    )
+    assert THRESHOLD.monotone
+    assert in_words(THRESHOLD._replace(monotone=False)) == in_words(THRESHOLD) + "*"
 
-    assert row.monotone
-    assert in_words(row._replace(monotone=False)) == in_words(row) + "*"
+
+README = (Path(__file__).parents[3] / "reports/stability/README.md").read_text("utf-8")
+
+
+def cells_of(text: str, table: int = 0) -> dict[tuple[str, str], str]:
+    lines = text.split("| fails at |")[1 + table].split("\n\n")[0].splitlines()
+    head, _, *rows = [[cell.strip() for cell in line.strip(" |").split("|")] for line in lines]
+    engines = [name.replace("<br>", ":") for name in head]
+    return {
+        (row[0], engine): cell
+        for row in rows
+        for engine, cell in zip(engines, row[1:], strict=True)
+    }
+
+
+CELLS, CELLS_OF_FETCHED = cells_of(README), cells_of(README, 1)
+
+
+@pytest.mark.parametrize(
+    ("cells", "rows", "engines"),
+    [
+        (CELLS, [KEPT_LIMITS[case, name] for case in IN_README for name in VARIANTS], VARIANTS),
+        (CELLS_OF_FETCHED, kept(FILE_OF_FETCHED), FETCHED),
+    ],
+    ids=["python", "javascript"],
+)
+def test_a_table_of_readme_has_the_first_failures_of_the_full_form(cells, rows, engines):
+    assert cells == {(IN_README[row.case], row.engine): in_words(row) for row in rows}
+    assert {row.engine for row in rows} == set(engines)
+    assert {row.form for row in rows} == {"full"}
+
+
+def test_a_number_that_is_no_longer_true_is_noticed():
+    line = f"| {IN_README['bounce_drift']} |"
+    old = CELLS[IN_README["bounce_drift"], VARIANTS[0]]
+    wrong = cells_of(README.replace(f"{line} {old} |", f"{line} 0.057 |"))
+
+    differ = [key for key, cell in wrong.items() if cell != CELLS[key]]
+    assert differ == [(IN_README["bounce_drift"], VARIANTS[0])]
+    assert wrong[differ[0]] != in_words(KEPT_LIMITS["bounce_drift", VARIANTS[0]])
+
+
+def test_the_number_of_phases_behind_a_limit_is_said():
+    most = max(case.runs for case in CASES.values())
+    case = CASES["tunnelling_head_on"]
+    page = " ".join(facts(case))
+    limit = KEPT_LIMITS["tunnelling_head_on", "box2d_v3:matched"]
+
+    assert f"It holds for the phases that were played, {most} at most" in README
+    assert most == case.runs == CASES["near_miss"].runs
+    assert f"a failure in fewer than one of {most} runs may be missed" in page
+    assert f"a step displacement of {limit.works_at:.4g} radii" in " ".join(README.split())
+
+
+def test_what_is_said_of_the_two_forms_is_what_they_do():
+    pattern = r"up to (\d+) runs.{0,200}?to\s+(\d+) %.{0,400}?`--full`.{0,200}?to\s+(\d+) %"
+    said = re.search(pattern, " ".join(README.split()))
+
+    assert said is not None
+    assert [int(number) for number in said.groups()] == [
+        max(case.runs for case in CASES.values()),
+        round(100 * (QUICK.ratio - 1)),
+        round(100 * (FULL.ratio - 1)),
+    ]

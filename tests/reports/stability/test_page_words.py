@@ -15,7 +15,6 @@ COLUMN = "column_of_ten"
 
 
 def played_with(case: Case, value: float) -> tuple[str, set[str]]:
-    """dt and the radii of the moving disks of a run, as the page writes them."""
     one = case.scene(value, 0)
     radii = one.scene.radius[~one.scene.static]
     return f"{number(1e3 * one.dt(one.substeps[0]))} ms", {number(r) for r in radii}
@@ -23,7 +22,6 @@ def played_with(case: Case, value: float) -> tuple[str, set[str]]:
 
 @pytest.mark.parametrize(("broken", "words"), [("refused", "refused from 3"), ("escape", "3")])
 def test_a_refusal_is_no_limit(broken: str, words: str):
-    """The table says so, and it is not counted as one."""
     trial = Trial(3.0, 1, 1, 1.0, event="it is cut", broken=broken)
     limit = Limit("spin", "box2d:matched", "quick", LIMIT, 1.0, 3.0, (trial,))
     limits, refused = (0, 1) if broken == "refused" else (1, 0)
@@ -35,7 +33,6 @@ def test_a_refusal_is_no_limit(broken: str, words: str):
 
 @pytest.mark.parametrize("name", ["slow_collision", "column", "tunnelling_thick_wall", "spin"])
 def test_what_a_case_keeps_is_that_of_every_run(name: str):
-    """Not only of those at the ends of its values."""
     case = CASES[name]
     kept = held(case)
 
@@ -46,15 +43,12 @@ def test_what_a_case_keeps_is_that_of_every_run(name: str):
 
 
 def test_what_a_case_varies_is_not_said_to_be_kept():
-    """dt of a case that varies dt, R of one that makes a scene smaller."""
     assert held(CASES["bounce_drift"]) == {"R": "0.25 m"}
     assert list(held(CASES["scale_down"])) == ["dt"]
     assert held(CASES["dt_galperin_314"]) == {"R": "0.25 to 0.5 m"}
 
 
 def test_the_column_of_the_report_and_that_of_the_limits_are_told_apart():
-    """Walls, time, step and criterion are those of the scenes, not typed; the same scene with
-    another dt says that it is the same."""
     one, mine = scenario(COLUMN), CASES["column"].scene(10, 0)
     said, same = in_report(CASES["column"]), in_report(CASES[f"dt_{COLUMN}"])
 

@@ -16,72 +16,72 @@ import numpy as np
 import pytest
 
 from crosscheck2d.adapters.run import Run
-from crosscheck2d.reports.compare.causes import CauseKind
-from crosscheck2d.reports.compare.verdicts import Verdict
+from crosscheck2d.reports.compare.causes import Cause, CauseKind
+from crosscheck2d.reports.compare.view import cut
 from crosscheck2d.reports.page.replay import pack_layers
 from crosscheck2d.reports.run.pool import Failure, run_all
 from crosscheck2d.reports.stability.cases import CASES
-from crosscheck2d.reports.stability.cases_gas import gas
+from crosscheck2d.reports.stability.cases_few import DT, EDGE, RADIUS, flyby, phase
+from crosscheck2d.reports.stability.cases_many import gas
+from crosscheck2d.reports.stability.command import csv_row
 from crosscheck2d.reports.stability.explain import explained
-from crosscheck2d.reports.stability.limits import FULL, QUICK, Case, Limit, LimitSearch, Trial
+from crosscheck2d.reports.stability.limits import (
+    FULL,
+    QUICK,
+    Case,
+    DrivenEngine,
+    Limit,
+    LimitSearch,
+    Trial,
+    play_as,
+)
 from crosscheck2d.reports.stability.predicates import Predicate, judge, read
 from crosscheck2d.reports.stability.results import (
     AFTER,
     BEFORE,
     RESULTS,
     Task,
-    failed,
     near,
     part_of,
-    row_of,
-    with_failure,
+    with_replay,
 )
-from crosscheck2d.reports.stability.scenes import DT, RADIUS, flyby
-from crosscheck2d.reports.stability.variants import DrivenEngine, play_as
 from crosscheck2d.scenarios.families.placing import lay_out
 from crosscheck2d.scenarios.model import Scenario, Trajectory
-
-
-def abort() -> None:
-    """As an engine does on an assertion in C."""
-    os.abort()
-
+from tests.reports.stability.kept_limits import quick_limit
 
 SCENE = lay_out(position=[[0, 0]], velocity=[[0, 0]], radius=[1.0], mass=[1.0], restitution=1.0)
+TOO_FAST = Predicate(
+    "too fast",
+    "the speed is above 1",
+    "m/s",
+    1.0,
+    lambda _, played: read(played.velocity[0, 0, 0], 0.5, "it broke"),
+)
 
 
-def read_speed(_: Scenario, played: Trajectory) -> Verdict:
-    """The reading is above 1."""
-    return read(played.velocity[0, 0, 0], 0.5, "it broke")
-
-
-TOO_FAST = Predicate("too fast", "m/s", 1.0, read_speed)
+def resting(scenario: Scenario) -> Run:
+    """A run in which nothing changes."""
+    state = scenario.scene.state
+    names = ("position", "velocity", "angle", "angular_velocity")
+    arrays = [np.array([getattr(state, name)] * 2) for name in names]
+    return Run("made", "up", "made-up", 1.0, trajectory=Trajectory(scenario.times, *arrays))
 
 
 def case(reading: Callable[[float, int], float], values: tuple[float, ...], **more: Any) -> Case:
     """A case whose runs read what a function of the value and the number of the run gives."""
 
     def scene(x: float, run: int) -> Scenario:
-        return Scenario(
-            "made-up", "?", "", replace(SCENE, velocity=[[reading(x, run), 0]]), 1.0, 1.0, (1,)
-        )
+        moving = replace(SCENE, velocity=[[reading(x, run), 0]])
+        return Scenario("made-up", "?", "", moving, 1.0, 1.0, (1,))
 
     def play(_: DrivenEngine, scenario: Scenario) -> tuple[Scenario, Run]:
-        start = scenario.scene.state
-        arrays = [
-            np.array([a, a])
-            for a in (start.position, start.velocity, start.angle, start.angular_velocity)
-        ]
-        return scenario, Run(
-            "made", "up", "made-up", 1.0, trajectory=Trajectory(scenario.times, *arrays)
-        )
+        return scenario, resting(scenario)
 
-    return Case("made-up", scene, "x", values, TOO_FAST, "?", play=play, **more)
+    return Case("made-up", "?", scene, "x", values, TOO_FAST, play=play, **more)
 
 
-def limit_of(one: Case, form: Any = FULL) -> Limit:
-    """The limit of an engine that does not matter."""
-    return LimitSearch(one, "reference:exercise", form).limit()
+def limit_of(tried: Case, form: Any = FULL) -> Limit:
+    return LimitSearch(tried, "reference:exercise", form).limit()
 
 
 UP, DOWN = (1.0, 3.0, 10.0, 30.0, 100.0), (100.0, 30.0, 10.0, 3.0, 1.0)
@@ -92,7 +92,6 @@ UP, DOWN = (1.0, 3.0, 10.0, 30.0, 100.0), (100.0, 30.0, 10.0, 3.0, 1.0)
     ("values", "reading"), [(UP, lambda x, _: x / 17), (DOWN, lambda x, _: 17 / x)]
 )
 def test_the_bracket_holds_the_limit_and_is_as_close_as_the_form_says(form, values, reading):
-    """Whether gentle is small or large: it works at 17 and just not beyond."""
     found = limit_of(case(reading, values), form)
 
     assert found.verdict == "limit"
@@ -102,14 +101,12 @@ def test_the_bracket_holds_the_limit_and_is_as_close_as_the_form_says(form, valu
 
 
 def test_what_is_counted_is_bracketed_by_neighbours():
-    """Up to 17 disks: works at 17, fails at 18."""
     found = limit_of(case(lambda x, _: x / 17.5, UP, whole=True), replace(FULL, ratio=1.0))
 
     assert (found.works_at, found.fails_at) == (17, 18)
 
 
 def test_a_limit_that_is_not_met_is_a_result():
-    """Neither a number that was not tried, nor an exception."""
     never_fails, never_works = (limit_of(case(lambda _x, _run, y=y: y, UP)) for y in (0.5, 2.0))
 
     assert never_fails.verdict == "does not fail"
@@ -120,23 +117,7 @@ def test_a_limit_that_is_not_met_is_a_result():
     assert isnan(never_works.works_at)
 
 
-def test_what_works_again_beyond_a_failure_is_seen():
-    """The scan goes on past the first failure; the bracket is that of the first."""
-    found = limit_of(case(lambda x, _: 2.0 if 5 < x < 20 else 0.5, UP))
-
-    assert not found.monotone
-    assert found.works_at <= 5 <= found.fails_at < 10
-    assert [trial.works for trial in found.trials if trial.value in UP] == [
-        True,
-        True,
-        False,
-        True,
-        True,
-    ]
-
-
 def test_what_works_only_where_it_is_harsh_is_called_so():
-    """No value that works before the first that fails."""
     found = limit_of(case(lambda x, _: 17 / x, UP))
 
     assert found.verdict == "works only beyond"
@@ -144,8 +125,8 @@ def test_what_works_only_where_it_is_harsh_is_called_so():
 
 
 def test_a_few_values_that_work_beyond_more_that_fail_are_no_limit():
-    """A step of a third of the run that meets its one collision by luck. A longer stretch is a
-    limit, and so is any that begins at the gentlest value; the harshest values may all work."""
+    # A step of a third of the run that meets its one collision by luck. A longer stretch is a
+    # limit, and so is any that begins at the gentlest value; the harshest values may all work.
 
     def verdict(*works: float) -> tuple[str, bool]:
         found = limit_of(case(lambda x, _: 0.5 if x in works else 2.0, UP, refines=False), QUICK)
@@ -158,7 +139,6 @@ def test_a_few_values_that_work_beyond_more_that_fail_are_no_limit():
 
 
 def test_one_run_in_sixteen_is_enough_to_fail_and_is_the_one_that_is_kept():
-    """The fraction that failed stands beside the limit; one run alone would have seen nothing."""
     rare = case(lambda x, run: 2.0 if run == 11 and x > 17 else 0.5, UP, runs=16)
     search = LimitSearch(rare, "reference:exercise", FULL)
     found = search.limit()
@@ -167,32 +147,21 @@ def test_one_run_in_sixteen_is_enough_to_fail_and_is_the_one_that_is_kept():
     assert failing is not None
     assert (failing.failed, failing.runs, failing.first) == (1, 16, 11)
     assert found.works_at <= 17 <= found.fails_at
-    kept = search.failure(found)
-    assert kept is not None
-    assert kept[0].scene.velocity[0, 0] == 2.0
+    assert search.seen[found.fails_at][0].scene.velocity[0, 0] == 2.0
     assert limit_of(replace(rare, runs=1)).verdict == "does not fail"
 
 
 def test_a_number_that_is_none_fails_and_a_run_that_broke_off_fails_with_its_reason():
-    """NaN is not below a bound; a refusal is called one."""
     refused = Run("made", "up", "made-up", 1.0, "unsupported", "no such thing")
     scenario = Scenario("made-up", "?", "", SCENE, 1.0, 1.0, (1,))
 
-    assert limit_of(case(lambda _x, _run: 2.0, UP)).verdict == "never works"
     reading = judge(TOO_FAST, scenario, refused)
     assert (reading.failed, reading.id, reading.text) == (True, "refused", "no such thing")
     nothing = TOO_FAST._replace(read=lambda _scenario, _played: read(float("nan"), 0.0, ""))
-    start = scenario.scene.state
-    arrays = [
-        np.array([a, a])
-        for a in (start.position, start.velocity, start.angle, start.angular_velocity)
-    ]
-    played = Run("made", "up", "made-up", 1.0, trajectory=Trajectory(scenario.times, *arrays))
-    assert judge(nothing, scenario, played).failed
+    assert judge(nothing, scenario, resting(scenario)).failed
 
 
 def test_a_statistic_may_fail_by_chance_in_one_run_of_sixteen_and_not_in_two():
-    """Of what is sampled and read with an error; a run of four that fails is too many."""
     one = case(lambda x, run: 2.0 if run < x else 0.5, (1.0, 2.0, 4.0), runs=16, by_chance=1 / 16)
     found = limit_of(one)
 
@@ -203,29 +172,26 @@ def test_a_statistic_may_fail_by_chance_in_one_run_of_sixteen_and_not_in_two():
 
 
 def test_the_limit_is_the_first_failure_and_what_works_beyond_is_seen_in_both_forms():
-    """Two stretches that fail: the search stops at the gentler, and says that there is more than
-    one edge."""
     one = case(lambda x, _: 2.0 if 5 < x < 20 or x > 50 else 0.5, UP)
     quick, full = (limit_of(one, form) for form in (QUICK, FULL))
 
     for found in (quick, full):
         assert found.verdict == "limit"
-        assert found.works_at <= 5 <= found.fails_at
+        assert found.works_at <= 5 <= found.fails_at < 10
         assert not found.monotone
+        works = [trial.works for trial in found.trials if trial.value in UP]
+        assert works == [True, True, False, True, False]
     assert quick.spacing == pytest.approx(3.0)
     assert full.spacing == pytest.approx(sqrt(3.0))
 
 
 def test_the_values_of_the_quick_form_are_some_of_those_of_the_full_one():
-    """So that where both have all runs, which are the same, what fails in one fails in the
-    other."""
     for name, one in CASES.items():
         assert set(one.scan(QUICK)) <= set(one.scan(FULL)), name
 
 
 def test_what_few_runs_do_not_show_is_found_next_to_the_limit_by_all_of_them():
-    """Run 11 fails from 4 on, where the four runs of the way see nothing; they alone would say
-    17."""
+    # Run 11 fails from 4 on, where the four runs of the way see nothing; they alone would say 17.
     one = case(lambda x, run: 2.0 if x > 17 or (run == 11 and x > 4) else 0.5, UP, runs=16)
     found = limit_of(one, QUICK)
 
@@ -234,22 +200,16 @@ def test_what_few_runs_do_not_show_is_found_next_to_the_limit_by_all_of_them():
 
 
 def test_a_value_is_left_at_its_first_failure_but_at_the_limit_all_is_played():
-    """Beyond the limit one run is enough to see that it does not work; the share that failed is
-    that of all at it."""
     found = limit_of(case(lambda x, run: 2.0 if x > 17 and run >= 1 else 0.5, UP, runs=16), QUICK)
     failing = found.failing
 
     assert failing is not None
     assert (failing.runs, failing.failed, failing.first, failing.left) == (16, 15, 1, False)
-    assert [(trial.runs, trial.left) for trial in found.trials if trial.value == 100.0] == [
-        (2, True)
-    ]
-    assert [trial.runs for trial in found.trials if trial.value == 1.0] == [4]
+    played = {trial.value: (trial.runs, trial.left) for trial in found.trials}
+    assert (played[1.0], played[100.0]) == ((4, False), (2, True))
 
 
 def test_one_phase_alone_would_overlook_the_limit():
-    """The negative control of the phases: with collisions in the middle of a step alone, tunnelling
-    begins at 4, not 2."""
     one = CASES["tunnelling_head_on"]
     blind = replace(one, scene=lambda x, _run: flyby(x * RADIUS / DT, 1), runs=1)
 
@@ -258,50 +218,41 @@ def test_one_phase_alone_would_overlook_the_limit():
 
 
 def test_a_worker_that_dies_is_a_row_of_the_table():
-    """The case is then known to have no result, and why."""
     task = Task("slow_collision", "pymunk:matched", "quick")
-    [(_, failure)] = run_all({task: abort}, workers=1)
+    [(_, failure)] = run_all({task: os.abort}, workers=1)
     assert isinstance(failure, Failure)
-    limit = failed(task, failure)
+    limit = task.lost(failure)
     assert isinstance(limit, Limit)
-    row = row_of(limit)
+    row = csv_row(limit)
 
     assert row["predicate"] == "crashed"
     assert "SIGABRT" in row["event"]
 
 
 def test_a_limit_comes_back_from_its_row_as_it_was():
-    """Through JSON, where what is not a number is text."""
-    for found in (
-        limit_of(case(lambda x, _: x / 17, UP)),
-        limit_of(case(lambda _x, _run: 2.0, UP)),
-    ):
+    fails = limit_of(case(lambda _x, _run: 2.0, UP))
+    cause = Cause(CauseKind.SETTING, "friction 0", shown="works with it")
+    for found in (limit_of(case(lambda x, _: x / 17, UP)), replace(fails, cause=cause)):
         again = RESULTS["limit"].validate_python(json.loads(json.dumps(asdict(found))))
         assert repr(again) == repr(found)
 
 
 def test_a_reason_is_tested_by_the_run_itself_or_called_likely():
-    """A prediction outside the bracket, or a variant that gets no farther, tests nothing."""
-    slow = LimitSearch(CASES["tunnelling_head_on"], "box2d_v3:matched", QUICK).limit()
-    free = LimitSearch(CASES["tunnelling_head_on"], "box2d_v3:matched+bullets", QUICK).limit()
+    slow = quick_limit("tunnelling_head_on", "box2d_v3:matched")
+    free = quick_limit("tunnelling_head_on", "box2d_v3:matched+bullets")
     elsewhere = replace(slow, works_at=3.9, fails_at=4.0)
-    [both, _], [alone], [wrong, _] = (
-        explained([slow, free]),
-        explained([slow]),
-        explained([elsewhere, slow]),
-    )
+    limits = [explained(pair)[0] for pair in ([slow, free], [slow], [elsewhere, slow])]
 
-    assert [limit.cause and limit.cause.shown for limit in (both, alone, wrong)] == [
+    assert [limit.cause and limit.cause.shown for limit in limits] == [
         "predicts 2; box2d_v3:matched+bullets gets farther",
         "predicts 2",
         "",
     ]
-    assert {limit.cause and limit.cause.kind for limit in (both, alone, wrong)} == {CauseKind.LAW}
-    assert row_of(wrong)["reason"].startswith("likely: ")
+    assert {limit.cause and limit.cause.kind for limit in limits} == {CauseKind.LAW}
+    assert csv_row(limits[2])["reason"].startswith("likely: ")
 
 
 def test_of_a_failing_run_only_what_is_shown_is_kept():
-    """Of 4000 samples the 160 around the failure, with the collisions among them."""
     scenario = gas(0.3, 0, rows=3, columns=3, steps=4000, every=1)
     run = play_as("reference:exercise", scenario)
     whole = run.trajectory
@@ -313,41 +264,42 @@ def test_of_a_failing_run_only_what_is_shown_is_kept():
     )
     shown = near(failing, scenario)
     part = part_of(whole, shown, scenario)
-    head, _ = head_and_numbers(with_failure(search, found).replay)
+    head = head_of(with_replay(search, found).replay)
 
     assert len(part) == len(shown) == BEFORE + AFTER + 1
     assert 0 < len(part.collisions) < len(whole.collisions) / 10
     assert np.array_equal(part.position, whole.position[shown])
     assert [layer["frames"] for layer in head["layers"]] == [len(shown)]
     assert head["opens"] < head["event"]["t"] == failing.at
-    assert with_failure(search, replace(found, trials=())).replay == ""
+    assert with_replay(search, replace(found, trials=())).replay == ""
 
 
-def head_and_numbers(pack: str) -> tuple[Any, bytes]:
-    """The two parts of what the page's player reads."""
+def head_of(pack: str) -> Any:
     whole = zlib.decompress(base64.b64decode(pack))
-    size = int.from_bytes(whole[:4], "little")
-    return json.loads(whole[4 : 4 + size]), whole[4 + size :]
+    return json.loads(whole[4 : 4 + int.from_bytes(whole[:4], "little")])
 
 
 def test_a_run_that_broke_off_is_kept_up_to_there():
-    """What is shown beyond its end is not there, and the page says when it ended."""
     scenario = gas(0.3, 0, rows=3, columns=3, steps=100, every=1)
     whole = play_as("reference:exercise", scenario).trajectory
     assert whole is not None
-    until = replace(
-        whole,
-        t=whole.t[:50],
-        position=whole.position[:50],
-        velocity=whole.velocity[:50],
-        angle=whole.angle[:50],
-        angular_velocity=whole.angular_velocity[:50],
-    )
     shown = np.arange(40, 61)
-    part = part_of(until, shown, scenario)
-    head, _ = head_and_numbers(
-        pack_layers(scenario, [(Run("made", "up", "gas", 1.0), part)], shown)
-    )
+    part = part_of(cut(whole, 50), shown, scenario)
+    pack = pack_layers(scenario, [(Run("made", "up", "gas", 1.0), part)], shown)
+    [layer] = head_of(pack)["layers"]
 
     assert len(part) == 10
-    assert (head["layers"][0]["frames"], head["layers"][0]["ends"]) == (10, f"{part.t[-1]:.4g}")
+    assert (layer["frames"], layer["ends"]) == (10, f"{part.t[-1]:.4g}")
+
+
+def test_phases_are_spread_evenly_and_drawn_and_fewer_are_the_first_of_more():
+    # The step's very beginning first; no gap between 32 phases is wider than a sixteenth of a step.
+    phases = [phase(run) for run in range(32)]
+
+    assert phases[0] == EDGE
+    assert phases[1:8:2] == pytest.approx([0.5, 0.25, 0.75, 0.125], abs=2 * EDGE)
+    assert all(EDGE <= x <= 1 - EDGE for x in phases)
+    assert np.diff(sorted(phases)).max() < 1 / 16 + 2 * EDGE
+    random = phases[2::2]
+    # what is random is no round share of a step
+    assert min(abs(x * 32 - round(x * 32)) for x in random) > 1e-3

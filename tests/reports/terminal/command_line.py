@@ -26,23 +26,18 @@ CROSSCHECK = Path(sys.executable).parent / "crosscheck"
 
 
 class Done(NamedTuple):
-    """How a command ended, in the words of `subprocess`."""
-
     returncode: int
     stdout: str
     stderr: str
 
 
 def process(*words: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
-    """The command as a person starts it."""
     return subprocess.run(
         [CROSSCHECK, *words], cwd=cwd, capture_output=True, text=True, timeout=300
     )
 
 
 def crosscheck(*words: str | Path, cwd: Path) -> Done:
-    """The command called here: a process of its own would spend seconds on loading what this one
-    has."""
     argv = ["crosscheck", *map(os.fspath, words)]
     with contextlib.chdir(cwd), mock.patch.object(sys, "argv", argv):
         done = CliRunner().invoke(app, argv[1:], catch_exceptions=False)
@@ -50,7 +45,6 @@ def crosscheck(*words: str | Path, cwd: Path) -> Done:
 
 
 def forked(*words: str | Path, cwd: Path) -> Done:
-    """The command in a process of its own that loads nothing, and is killed if it hangs."""
     with TemporaryDirectory() as folder:
         process = start(
             crosscheck_in, [*map(os.fspath, words)], cwd, Path(folder), {"COLUMNS": "400"}
@@ -64,7 +58,6 @@ def forked(*words: str | Path, cwd: Path) -> Done:
 
 
 def wait_for(done: Callable[[], bool]) -> None:
-    """Until it is done, for two minutes at most."""
     for _ in range(2400):
         if done():
             return
@@ -73,8 +66,6 @@ def wait_for(done: Callable[[], bool]) -> None:
 
 
 def on_terminal(columns: int, *words: str | Path, cwd: Path) -> Done:
-    """The command in a fork on a pseudo-terminal so many columns wide; `stdout` is all it wrote
-    there."""
     ours, theirs = os.openpty()
     fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 40, columns, 0, 0))
     # rich asks the terminal for its width only where COLUMNS is no number
@@ -97,7 +88,6 @@ def on_terminal(columns: int, *words: str | Path, cwd: Path) -> Done:
 
 
 def read_all(terminal: int, written: list[bytes]) -> None:
-    """What is written to a terminal, until nobody has it open for writing."""
     with contextlib.suppress(OSError):  # how Linux says so
         while some := os.read(terminal, 65536):
             written.append(some)

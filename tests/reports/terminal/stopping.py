@@ -18,15 +18,6 @@ AT_MOST = 3.0  # s that a command may take to end, on a machine that does nothin
 
 
 class Ended(NamedTuple):
-    """How a command ended that was signalled to.
-
-    Attributes:
-        status: as a shell has it.
-        seconds: from the signal to its end, by the clock.
-        said: on standard error.
-        left: the processes of its making that are still there.
-    """
-
     status: int
     seconds: float
     said: str
@@ -34,9 +25,6 @@ class Ended(NamedTuple):
 
 
 class Command:
-    """A command in a session of its own; `stalled`: MODULE:NAME of a function that never returns in
-    it."""
-
     def __init__(self, *words: str | Path, cwd: Path, stalled: str = "") -> None:
         self.cwd, self.mark = cwd, cwd / ".mark"
         mine = {"STALL": stalled, "STALL_MARK": str(self.mark), "PYTHONPATH": str(STALLS)}
@@ -53,17 +41,14 @@ class Command:
             )
 
     def when(self, here: Callable[[], object]) -> Command:
-        """Wait until it is there; a command that has ended before is a fault."""
         wait_for(lambda: here() or self.process.poll() is not None)
         assert self.process.poll() is None, self.errors.read_text()
         return self
 
     def stalled(self) -> Command:
-        """Wait until it is where it never comes back from."""
         return self.when(self.mark.exists)
 
     def stop(self, how: int, whole_group: bool = False) -> Ended:
-        """Signal it, or as a terminal does all processes of its group, and wait for its end."""
         started = time.monotonic()
         (os.killpg if whole_group else os.kill)(self.process.pid, how)
         try:
@@ -77,8 +62,6 @@ class Command:
         return Ended(128 - status if status < 0 else status, seconds, self.errors.read_text(), left)
 
     def others(self) -> list[int]:
-        """The living processes that come from this command: they have its mark among their
-        variables."""
         mark, found = f"STALL_MARK={self.mark}".encode(), []
         for folder in Path("/proc").glob("[0-9]*"):
             try:
@@ -91,19 +74,14 @@ class Command:
 
 
 def hears_ctrl_c() -> None:
-    """A shell that puts tests into the background has them ignore Ctrl-C, and what they start does,
-    too."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def busyness() -> float:
-    """How many times longer things take here now than on an idle machine: processes that want to
-    run, over cores."""
     return max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))
 
 
 def assert_ended(ended: Ended, how: int) -> None:
-    """In time, with the status of that signal, without a traceback, and nothing is left running."""
     assert ended.seconds < AT_MOST * busyness(), ended
     assert ended.status == 128 + how, ended
     assert "Traceback" not in ended.said

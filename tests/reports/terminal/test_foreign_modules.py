@@ -37,7 +37,7 @@ pytestmark = [
 ROOT = Path(__file__).parents[3]
 SOURCE = ("adapters", "reference_impl", "reports", "scenarios")
 OURS = (*SOURCE, "crosscheck2d", "tests")
-LIBRARIES = (
+LIBRARIES = [
     "Box2D",
     "flint",
     "gmpy2",
@@ -49,7 +49,8 @@ LIBRARIES = (
     "pymunk",
     "rich",
     "typer",
-)
+]
+RUN = f"run head_on_equal_e09 --dt {1 / 60} --engine my_arrays.py --out ../out --engine "
 BY_THEMSELVES = ("sitecustomize", "usercustomize", "conftest", "__main__")
 TRAP = (
     "open({mark!r}, 'a').write({name!r} + ' ')\nraise SystemExit('{name}.py of the current folder"
@@ -61,7 +62,6 @@ SOLVERS = {
 
 
 def trapped(folder: Path, names: Iterable[str]) -> Callable[[], str]:
-    """Put a module of each name into `folder`; returns what shows which of them were run."""
     mark = folder.parent / f"{folder.name}.ran"
     folder.mkdir()
     for name in names:
@@ -71,8 +71,6 @@ def trapped(folder: Path, names: Iterable[str]) -> Callable[[], str]:
 
 @pytest.fixture
 def ran(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[], str]:
-    """What shows which modules were run of the current folder, which has all names of Python's and
-    of what we use."""
     reported = trapped(
         tmp_path / "here", (*sys.stdlib_module_names, *OURS, *LIBRARIES, *BY_THEMSELVES)
     )
@@ -83,7 +81,6 @@ def ran(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[], str]:
 
 
 def in_a_worker() -> Any:
-    """How a cell ended that was played in a worker started here."""
     task = partial(
         play_here,
         Cell("slow_collision", 0, "good:control", 1),
@@ -95,7 +92,6 @@ def in_a_worker() -> Any:
 
 
 def start_unsafely(connection: Any, folder: str, memory: int) -> Any:
-    """A worker as multiprocessing starts one."""
     process = multiprocessing.get_context("spawn").Process(
         target=pool.serve, args=(connection, folder, memory, False)
     )
@@ -105,7 +101,6 @@ def start_unsafely(connection: Any, folder: str, memory: int) -> Any:
 
 @pytest.fixture(autouse=True)
 def spawned(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Workers are new interpreters, as on macOS and Windows: a fork imports nothing."""
     monkeypatch.setattr(pool, "CONTEXT", multiprocessing.get_context("spawn"))
 
 
@@ -113,8 +108,6 @@ def spawned(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_worker_imports_nothing_of_the_folder_it_is_started_in(
     ran, monkeypatch: pytest.MonkeyPatch, entry: list[str]
 ):
-    """The cell is played as anywhere else; so where the path ends with an empty entry, as Python's
-    own for -c."""
     monkeypatch.setattr(sys, "path", [*sys.path, *entry])
     assert in_a_worker().run.status == "ok"
     assert ran() == ""
@@ -123,8 +116,6 @@ def test_a_worker_imports_nothing_of_the_folder_it_is_started_in(
 def test_without_the_safe_path_a_worker_is_caught_and_its_cell_is_no_result(
     ran, monkeypatch: pytest.MonkeyPatch
 ):
-    """The negative control: the traps work; and what came of it is said to lie outside the
-    engine."""
     monkeypatch.setattr(pool, "start_process", start_unsafely)
     monkeypatch.delenv("PYTHONSAFEPATH", raising=False)  # of workers started before
     ended = in_a_worker()
@@ -137,17 +128,9 @@ def test_without_the_safe_path_a_worker_is_caught_and_its_cell_is_no_result(
 
 @pytest.mark.parametrize(
     "name",
-    [
-        "reference_impl.exercise",
-        "crosscheck2d.reference_impl.exercise",
-        "crosscheck2d.reports",
-        "adapters",
-        "tests",
-    ],
+    ["reference_impl.exercise", "crosscheck2d.reference_impl.exercise", "adapters", "tests"],
 )
 def test_a_solver_imports_no_part_of_the_package(tmp_path: Path, name: str):
-    """By neither of its names: all that is there are the two modules that a copy of the exercise's
-    solver imports."""
     (tmp_path / "mine.py").write_text(f"import {name}\ndef integrate(sphere, dt): pass\n")
     with pytest.raises(SolverFailed, match=r"imports \S+, which is not available here") as failed:
         SolverProcess(read_solver(tmp_path / "mine.py"))
@@ -156,15 +139,12 @@ def test_a_solver_imports_no_part_of_the_package(tmp_path: Path, name: str):
 
 @pytest.mark.parametrize("name", SOLVERS)
 def test_a_solver_imports_libraries_and_not_what_lies_beside_it(ran, name: str):
-    """Python's own random is Python's own, numpy is numpy, crosscheck2d is ours."""
     with SolverProcess(read_solver(Path(f"my_{name}"))) as process:
         assert process.functions["collide"]
     assert ran() == ""
 
 
 def test_what_a_solver_imports_of_its_own_is_found(ran):
-    """A module beside it, a package, one that those import; a name of Python's is Python's there,
-    too."""
     Path("package").mkdir()
     Path("package", "__init__.py").write_text(
         "from package.inner import TWO\nfrom .inner import THREE\n"
@@ -196,8 +176,6 @@ def test_what_a_solver_imports_of_its_own_is_found(ran):
 
 @cache
 def imported_here() -> frozenset[str]:
-    """The modules of Python's that this program imports, but for those that Python itself has
-    imported before it."""
     found = set()
     for path in (path for folder in SOURCE for path in (ROOT / folder).rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text())):
@@ -216,12 +194,7 @@ def imported_here() -> frozenset[str]:
     "path", [".", *(pytest.param(path, marks=pytest.mark.slow) for path in (":", ":/nowhere"))]
 )
 def test_a_pythonpath_with_the_current_folder_runs_nothing_of_it(tmp_path: Path, path: str):
-    """An empty entry of PYTHONPATH is the current folder; all that this program imports is called
-    so there."""
-    ran = trapped(
-        tmp_path / "here",
-        {*imported_here(), "secrets", "numbers", "random", *SOURCE},
-    )
+    ran = trapped(tmp_path / "here", {*imported_here(), "secrets", "numbers", "random", *SOURCE})
     done = subprocess.run(
         [CROSSCHECK, "list", "metrics"],
         cwd=tmp_path / "here",
@@ -235,7 +208,6 @@ def test_a_pythonpath_with_the_current_folder_runs_nothing_of_it(tmp_path: Path,
 
 @pytest.fixture
 def path(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """`sys.path`, to be changed at will; what finds modules is then as it was, too."""
     monkeypatch.setattr(sys, "meta_path", sys.meta_path[:])
     monkeypatch.setattr(sys, "path", sys.path[:])
     return sys.path
@@ -244,7 +216,6 @@ def path(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 def test_only_the_current_folder_and_that_of_the_program_are_left_out(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, path: list[str]
 ):
-    """What else somebody has put on the path stays."""
     monkeypatch.chdir(tmp_path)
     path[:] = ["", str(tmp_path), "/else", str(ROOT), "/more"]
     safe_path.keep_path_safe()
@@ -255,24 +226,19 @@ def test_only_the_current_folder_and_that_of_the_program_are_left_out(
 def test_a_folder_that_modules_are_installed_in_stays_where_it_was_last(
     monkeypatch: pytest.MonkeyPatch, path: list[str], of: Any
 ):
-    """Who stands in it has it on the path twice, for `python -m` before Python's own."""
-    monkeypatch.chdir(
-        folder := (Path(of.__file__).parent if of is ast else Path(of.__file__).parents[1])
-    )
+    monkeypatch.chdir(folder := Path(of.__file__).parents[0 if of is ast else 1])
     path[:] = [str(folder), "/else", str(folder), "/more"]
     safe_path.keep_path_safe()
     assert path == ["/else", str(folder), "/more"]
 
 
 def test_of_the_folder_of_the_program_only_the_package_and_its_tests_are_found():
-    """Its parts have no other name."""
     find = safe_path.OwnPackages().find_spec
     assert all(find(name) is not None for name in ("crosscheck2d", "tests"))
     assert [find(name) for name in (*SOURCE, "scipy", "conftest")] == [None] * 6
 
 
 def test_a_new_process_finds_the_package_where_nothing_is_installed():
-    """Without site-packages, and so without what else finds it in a clone."""
     words = safe_path.python("import crosscheck2d.adapters; print(crosscheck2d.__file__)")
     done = subprocess.run([words[0], "-S", *words[1:]], capture_output=True, text=True)
     assert done.stdout.strip() == str(ROOT / "__init__.py"), done.stderr[-500:]
@@ -280,8 +246,6 @@ def test_a_new_process_finds_the_package_where_nothing_is_installed():
 
 @pytest.fixture(scope="module")
 def clone(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Callable[[], str]]:
-    """A clone of the program with modules in its root that nobody asked for, and what shows which
-    of them were run."""
     base = tmp_path_factory.mktemp("clone")
     ran = trapped(
         base / "crosscheck2d",
@@ -312,27 +276,12 @@ def clone(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Callable[[], 
         ["list", "engines"],
         pytest.param(["check", "my_plain.py"], marks=pytest.mark.long),
         pytest.param(["check", "my_plain.js"], marks=pytest.mark.long),
-        pytest.param(
-            [
-                "run",
-                "head_on_equal_e09",
-                "--dt",
-                str(1 / 60),
-                "--engine",
-                "reference:exercise",
-                "--engine",
-                "my_arrays.py",
-                "--out",
-                "../out",
-            ],
-            marks=pytest.mark.long,
-        ),
+        pytest.param([*RUN.split(), "reference:exercise"], marks=pytest.mark.long),
     ],
 )
 def test_a_module_beside_readme_is_not_run_where_everybody_stands(
     clone: tuple[Path, Callable[[], str]], begin: list[str], words: list[str]
 ):
-    """The root at the end of the path, or before all others, as `-m` does it."""
     root, ran = clone
     at_end = f"import sys; sys.path.append({str(root)!r}); sys.argv[0] = 'crosscheck'; "
     begin = begin if begin[0] == "-m" else [*begin[:2], at_end + begin[2]]
@@ -350,7 +299,6 @@ def test_a_module_beside_readme_is_not_run_where_everybody_stands(
 
 
 def test_without_the_safe_path_a_module_beside_readme_is_run(clone: tuple[Path, Callable[[], str]]):
-    """The negative control: the traps of that folder work."""
     root, ran = clone
     code = f"import sys; sys.path.append({str(root)!r}); import numba.core.types; import scipy"
     done = subprocess.run([sys.executable, "-P", "-c", code], capture_output=True, text=True)
@@ -364,27 +312,12 @@ def test_without_the_safe_path_a_module_beside_readme_is_run(clone: tuple[Path, 
 @pytest.mark.parametrize(
     "words",
     [
-        pytest.param(
-            [
-                "run",
-                "head_on_equal_e09",
-                "--dt",
-                str(1 / 60),
-                "--engine",
-                "pymunk:matched",
-                "--engine",
-                "my_arrays.py",
-                "--out",
-                "../out",
-            ],
-            marks=pytest.mark.long,
-        ),
+        pytest.param([*RUN.split(), "pymunk:matched"], marks=pytest.mark.long),
         ["check", "my_plain.py"],
         pytest.param(["truth", "head_on_equal_e09"], marks=pytest.mark.long),
     ],
 )
 def test_a_command_runs_nothing_of_the_folder_it_is_started_in(ran, words: list[str]):
-    """As a person starts it: exit 0."""
     done = subprocess.run([CROSSCHECK, *words], capture_output=True, text=True, timeout=300)
 
     assert (done.returncode, ran()) == (0, ""), done.stderr

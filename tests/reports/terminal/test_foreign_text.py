@@ -12,9 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.table import Table
 
+from crosscheck2d.reports.run.made import may_overwrite
 from crosscheck2d.reports.terminal.console import Console
 from crosscheck2d.reports.terminal.exits import say
-from crosscheck2d.reports.terminal.foreign_text import encoded, legible, put_bytes
+from crosscheck2d.reports.terminal.foreign_text import legible, put_text
 from crosscheck2d.reports.terminal.progress import Progress
 from tests.reports.terminal.command_line import crosscheck
 
@@ -32,8 +33,6 @@ SCENE = Path(__file__).parents[3] / "tests" / "data" / "scenes" / "two.toml"
 
 @given(st.text(alphabet=st.characters()))
 def test_legible_text_holds_nothing_that_acts_on_a_terminal(text: str):
-    """No control, format or surrogate character but the end of a line; what is plain stays as it
-    is."""
     found = legible(text)
 
     assert not [c for c in found if unicodedata.category(c) in ("Cc", "Cf", "Cs") and c != "\n"]
@@ -42,8 +41,6 @@ def test_legible_text_holds_nothing_that_acts_on_a_terminal(text: str):
 
 
 def test_the_console_prints_markup_as_it_is(capsys: pytest.CaptureFixture[str]):
-    """As a sentence, in a table, as its title and heading; a progress bar and standard error do,
-    too."""
     table = Table(HOSTILE, title=HOSTILE)
     table.add_row(HOSTILE)
     console = Console(width=300)
@@ -65,7 +62,6 @@ def test_the_console_prints_markup_as_it_is(capsys: pytest.CaptureFixture[str]):
 
 @pytest.mark.parametrize("what", ["[/nope]", "\\u001b[31mred", "\\u0007", ":boom: [bold]"])
 def test_the_question_of_a_scene_is_printed_as_it_is(tmp_path: Path, what: str):
-    """`truth` and a refusal show `asks` and a bad value, whatever they hold."""
     (tmp_path / "x.toml").write_text(
         SCENE.read_text().replace("Does a head-on collision", f"{what} Does a collision")
     )
@@ -80,8 +76,6 @@ def test_the_question_of_a_scene_is_printed_as_it_is(tmp_path: Path, what: str):
 
 
 def test_only_one_console_prints():
-    """No file but reports/terminal/console.py makes a console of rich's, or takes text as
-    markup."""
     users = {
         str(path.relative_to(ROOT))
         for path in FILES
@@ -97,8 +91,6 @@ def test_only_one_console_prints():
 
 
 def without_encoding(source: str) -> list[int]:
-    """The lines of a Python text in which a file is read or written as text in the encoding of the
-    place it runs in."""
     found = []
     for node in ast.walk(ast.parse(source)):
         if not isinstance(node, ast.Call):
@@ -131,7 +123,6 @@ def without_encoding(source: str) -> list[int]:
 
 
 def test_every_file_names_its_encoding():
-    """What Latin-1 is elsewhere stays UTF-8 in our files and scripts."""
     lines = {
         str(path.relative_to(ROOT)): without_encoding(path.read_text(encoding="utf-8"))
         for path in FILES
@@ -142,7 +133,6 @@ def test_every_file_names_its_encoding():
 
 
 def test_a_file_that_names_none_is_found():
-    """The control."""
     bad = ["p.read_text()", "p.open('w')", "open(p)", "os.fdopen(1, 'w')", "run(c, text=True)"]
     good = ["open(p, 'rb')", "open(p, encoding='utf-8')", "p.read_bytes()", "os.open(p, 1)"]
 
@@ -150,26 +140,45 @@ def test_a_file_that_names_none_is_found():
 
 
 def test_a_file_is_written_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """Where the disk is full the old one stays; a path that is not UTF-8 is written in code."""
-    put_bytes(tmp_path / "a", b"old")
+    path, link = tmp_path / "a", tmp_path / "link"
+    put_text(path, "old")
+    link.symlink_to("a")
 
     def full(*_: Path) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(Path, "replace", full)
-    with pytest.raises(OSError, match="No space"):
-        put_bytes(tmp_path / "a", b"new")
-
-    assert [path.name for path in tmp_path.iterdir()] == ["a"]
-    assert (tmp_path / "a").read_bytes() == b"old"
-    assert encoded("a\udcffb") == b"a\\udcffb"
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "replace", full)
+        with pytest.raises(OSError, match="No space"):
+            put_text(path, "new")
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["a", "link"]
+    assert path.read_text() == "old"
+    put_text(link, "new a\udcffb")  # a path that is not UTF-8 is written in code
+    assert (link.is_symlink(), path.read_text()) == (True, "new a\\udcffb")
 
 
 def test_what_is_written_to_a_pipe_by_its_descriptor_arrives():
-    """As `--page /dev/stdout` is where a command is piped into another: a link to what has no
-    path."""
     reading, writing = os.pipe()
     with open(reading, "rb") as pipe:
         with open(writing, "wb"):
-            put_bytes(Path(f"/dev/fd/{writing}"), b"all of it")
+            # as `--page /dev/stdout` of a command in a pipe: a link to what has no path
+            put_text(Path(f"/dev/fd/{writing}"), "all of it")
         assert pipe.read() == b"all of it"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("option", ["--page", "--junit"])
+def test_a_file_that_a_check_did_not_write_is_not_written_over(tmp_path: Path, option: str):
+    (tmp_path / "solver.py").write_text("def integrate(sphere, dt):\n    pass\n")
+    (tmp_path / "mine.html").write_text("years of work")
+    (tmp_path / "link.html").symlink_to("mine.html")
+    (tmp_path / "gone.html").symlink_to("nowhere/gone.html")
+    names = sorted(path.name for path in tmp_path.rglob("*"))
+    for name in ("mine.html", "link.html", "gone.html", "nowhere/new.html", "."):
+        done = crosscheck("check", "solver.py", option, name, cwd=tmp_path)
+        assert done.returncode == 2
+        assert f"{option} {name}: " in done.stderr
+    may_overwrite(Path(os.devnull), b"mark", "page", option)
+
+    assert sorted(path.name for path in tmp_path.rglob("*")) == names
+    assert (tmp_path / "mine.html").read_text() == "years of work"

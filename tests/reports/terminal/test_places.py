@@ -9,7 +9,6 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from crosscheck2d.reports.terminal.streams import Outlet
 from tests.reports.terminal.command_line import CROSSCHECK
 
 SCENE = Path(__file__).parents[3] / "tests" / "data" / "scenes" / "two.toml"
@@ -19,25 +18,10 @@ REFUSED = "cannot write to standard output: "
 
 
 def shell(line: str, cwd: Path, **environment: str) -> subprocess.CompletedProcess[bytes]:
-    """A line of bash, in which $C is the command."""
     variables = os.environ | {"C": str(CROSSCHECK)} | environment
     return subprocess.run(
         ["bash", "-c", line], cwd=cwd, env=variables, capture_output=True, timeout=300
     )
-
-
-def test_an_outlet_takes_all_and_remembers_the_first_fault():
-    """/dev/full refuses every byte; what is given to it later is dropped in silence."""
-    with open("/dev/full", "wb") as full, open("/dev/null", "wb") as null:
-        lost, kept = (
-            Outlet(full.fileno(), "w", closefd=False),
-            Outlet(null.fileno(), "w", closefd=False),
-        )
-
-        assert (lost.write(b"four"), lost.write(memoryview(b"three"))) == (4, 5)
-        assert lost.fault is not None
-        assert lost.fault.strerror == "No space left on device"
-        assert (kept.write(b"four"), kept.fault) == (4, None)
 
 
 @pytest.mark.slow
@@ -45,21 +29,8 @@ def test_an_outlet_takes_all_and_remembers_the_first_fault():
     ("line", "code", "said"),
     [
         ("$C list engines >/dev/full", 1, REFUSED + "No space left on device"),
-        pytest.param(
-            "$C list engines >&-", 1, REFUSED + "Bad file descriptor", marks=pytest.mark.slow
-        ),
-        pytest.param(
-            "$C list engines | head -0; exit ${PIPESTATUS[0]}",
-            0,
-            "",
-            marks=pytest.mark.slow,
-        ),
-        pytest.param("$C list engines >/dev/null", 0, "", marks=pytest.mark.long),
-        pytest.param(
-            "$C list nothing >&-", 2, "list 'nothing' is not known", marks=pytest.mark.long
-        ),
-        pytest.param("$C list nothing 2>&-", 2, "", marks=pytest.mark.slow),
-        pytest.param("$C list nothing 2>/dev/full", 2, "", marks=pytest.mark.long),
+        ("$C list engines | head -0; exit ${PIPESTATUS[0]}", 0, ""),
+        ("$C list nothing 2>&-", 2, ""),
         ("$C list engines <&- >&- 2>&-", 1, ""),
         ("PYTHONOPTIMIZE=2 $C list engines", 2, "PYTHONOPTIMIZE=2"),
     ],
@@ -67,7 +38,6 @@ def test_an_outlet_takes_all_and_remembers_the_first_fault():
 def test_a_stream_that_takes_nothing_is_one_sentence(
     tmp_path: Path, line: str, code: int, said: str
 ):
-    """Full, closed, or left by who read it; no traceback, no other line, and the right exit."""
     done = shell(line, tmp_path)
     text = done.stderr.decode()
 
@@ -77,67 +47,23 @@ def test_a_stream_that_takes_nothing_is_one_sentence(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "stream",
-    [
-        ">/dev/full",
-        *(
-            pytest.param(stream, marks=pytest.mark.long)
-            for stream in (">&-", "| head -0; exit ${PIPESTATUS[0]}", "2>/dev/full", "2>&- >&-")
-        ),
-    ],
-)
+@pytest.mark.parametrize("stream", [">/dev/full", pytest.param("2>&- >&-", marks=pytest.mark.long)])
 def test_what_was_computed_is_kept_whatever_becomes_of_the_streams(tmp_path: Path, stream: str):
-    """The run is whole in its place; a closed number of a stream is not taken by the journal and
-    printed into."""
     done = shell(
         f"$C run slow_collision --engine pymunk:matched --out out --workers 1 --timings 0 {stream}",
         tmp_path,
     )
 
-    assert done.returncode == (0 if stream == "2>/dev/full" else 1)
+    assert done.returncode == 1
     assert b"Traceback" not in done.stderr
     assert set(pd.read_csv(tmp_path / "out" / "runs.csv").status) == {"ok"}
     assert (tmp_path / "out" / "report.html").stat().st_size > 50_000
     assert shell("$C report out", tmp_path).returncode == 0
 
 
-@pytest.fixture(scope="module")
-def latin(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """The variables of a German Latin-1 place; skips where no locale can be made."""
-    folder = tmp_path_factory.mktemp("locale")
-    if shutil.which("localedef") is None:
-        pytest.skip("no localedef")
-    name = "de_DE.ISO-8859-1"
-    subprocess.run(
-        ["localedef", "-i", "de_DE", "-f", "ISO-8859-1", folder / name], capture_output=True
-    )
-    if not (folder / name).exists():
-        pytest.skip("the system has no sources of locales")
-    return {"LOCPATH": str(folder), "LC_ALL": name}
-
-
-PLACES = {
-    "C": {"LC_ALL": "C"},
-    "C, and no UTF-8 mode": {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"},
-    "ascii": {"PYTHONIOENCODING": "ascii"},
-    "latin-1": {"PYTHONIOENCODING": "latin-1"},
-}
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "place", [*(pytest.param(place, marks=pytest.mark.long) for place in PLACES), "German"]
-)
-def test_a_run_with_names_in_other_bytes_is_whole_everywhere(
-    tmp_path: Path, place: str, request: pytest.FixtureRequest
-):
-    """Folder, scene file and solver have bytes in their names that are no UTF-8: played, reported,
-    compared.
-
-    Tables and page are UTF-8 all the same, and the scripts of the page the same bytes as elsewhere.
-    """
-    variables = request.getfixturevalue("latin") if place == "German" else PLACES[place]
+def test_a_run_with_names_in_other_bytes_is_whole_where_letters_are_few(tmp_path: Path):
+    variables = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
     here = tmp_path / os.fsdecode(b"pl\xff\xfc")
     here.mkdir()
     (here / os.fsdecode(b"two\xe9.toml")).write_text(SCENE.read_text().split("[[wall]]")[0])
@@ -169,13 +95,10 @@ def test_a_run_with_names_in_other_bytes_is_whole_everywhere(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "encoding", ["ascii", "cp437", pytest.param("cp1252", marks=pytest.mark.long)]
-)
+@pytest.mark.parametrize("encoding", ["ascii", "cp437"])
 def test_what_a_console_cannot_write_is_escaped_before_a_table_is_laid_out(
     tmp_path: Path, encoding: str
 ):
-    """Escaped afterwards, the numbers of a row would not stand below their heading."""
     # one right, and one with a fault, whose sentence is folded
     for name, old in (
         ("Übung 3 Müller (final)", ""),

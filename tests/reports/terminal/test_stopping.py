@@ -95,7 +95,6 @@ FEW = ("the answer in run", "a limit in stability", "a scene in check")
 
 @pytest.fixture(scope="module")
 def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A run of `TWO`."""
     folder = tmp_path_factory.mktemp("done")
     (folder / "two.toml").write_text(FILE)
     assert crosscheck(*TWO, cwd=folder).returncode == 0
@@ -104,8 +103,6 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def place(done: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Where a command is started: the scene, and a run of which nothing has been compared. No
-    answer is known."""
     monkeypatch.setenv("CROSSCHECK_CACHE", str(tmp_path / "cache"))
     (tmp_path / "two.toml").write_text(FILE)
     shutil.copytree(done, tmp_path / "done")
@@ -125,8 +122,6 @@ def place(done: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_a_command_ends_at_any_stage_though_compiled_code_never_returns(
     place: Path, stage: str, how: int
 ):
-    """Ctrl-C goes to the whole group, as from a terminal, SIGTERM to the command alone: no process
-    outlives it."""
     words, stalled = STALLED[stage]
     command = Command(*words, cwd=place, stalled=stalled).stalled()
     ended = command.stop(how, whole_group=how == signal.SIGINT)
@@ -137,8 +132,6 @@ def test_a_command_ends_at_any_stage_though_compiled_code_never_returns(
 @pytest.mark.slow
 @pytest.mark.parametrize("how", TERM)
 def test_what_was_played_is_kept_and_gone_on_with(place: Path, done: Path, how: int):
-    """Signalled to stop while it compares: the sentence counts the cells, and the same command
-    gives the bytes of a whole run."""
     command = Command(
         *TWO, cwd=place, stalled="crosscheck2d.reports.compare.comparison:_measure"
     ).stalled()
@@ -172,8 +165,6 @@ def test_what_was_played_is_kept_and_gone_on_with(place: Path, done: Path, how: 
     "after", [1.0, *(pytest.param(after, marks=pytest.mark.long) for after in (0.3, 2.0))]
 )
 def test_a_command_ends_whenever_it_is_signalled(place: Path, words: list, how: int, after: float):
-    """While it imports, starts workers, writes: after so many s, wherever that is; what has ended
-    by itself is done."""
     command = Command(*words, cwd=place)
     with suppress(subprocess.TimeoutExpired):
         command.process.wait(after)
@@ -206,8 +197,6 @@ GAME = (["play", "--engine", "reference"], "crosscheck2d.reports.game.session:Fl
 def test_a_server_ends_though_a_page_never_gets_its_answer(
     place: Path, words: list, stalled: str, asked: str, how: int, status: int
 ):
-    """Ctrl-C is how it is stopped, and no fault; a page that has asked for what never comes is not
-    waited for."""
     command = Command(*words, cwd=place, stalled=stalled).when(
         lambda: "localhost:" in printed(place)
     )
@@ -222,14 +211,11 @@ def test_a_server_ends_though_a_page_never_gets_its_answer(
 
 
 def printed(place: Path) -> str:
-    """What a command has printed so far."""
     return (place / ".stdout").read_text()
 
 
 @pytest.mark.slow
 def test_what_takes_too_long_is_said_and_the_other_scene_is_judged(place: Path):
-    """--timeout reaches the exact answer: rows that say so, exit 1, and both commands that look at
-    it say the same."""
     said = "two is not judged: the exact answer took longer than 2 s (--timeout)"
     run = Command(*TWO, "--timeout", "2", cwd=place, stalled=TRUTH)
     assert run.process.wait(300) == 1, run.errors.read_text()
@@ -260,8 +246,6 @@ def test_what_takes_too_long_is_said_and_the_other_scene_is_judged(place: Path):
     ],
 )
 def test_a_solver_that_loops_ends_with_whoever_asked_it(tmp_path: Path, name: str, text: str):
-    """`kill -9` of a process that waits, for 60 s, for a call: the process of the file does not
-    stay behind."""
     (tmp_path / name).write_text(text)
     question = {"spheres": [[0.0] * 12], "calls": [["integrate", 0, 1e-3]], "world": False}
     asks = (
@@ -281,12 +265,9 @@ def test_a_solver_that_loops_ends_with_whoever_asked_it(tmp_path: Path, name: st
 
 
 def asked_by(parent: int) -> list[int]:
-    """The processes that a process has started, and all that these have."""
     return [child.pid for child in psutil.Process(parent).children(recursive=True)]
 
 
 def busy(pid: int) -> bool:
-    """Whether a process has loaded what it needs, in 0.2 s, and is in its loop: 1 s of processor
-    time."""
     fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK") > 1.0

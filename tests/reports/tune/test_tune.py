@@ -14,6 +14,17 @@ from crosscheck2d.adapters.matched import chosen, searched
 from crosscheck2d.adapters.npm_packages import missing
 from crosscheck2d.adapters.pymunk import MATCHED as PYMUNK
 from crosscheck2d.reports.compare.view import cut
+from crosscheck2d.reports.tune.command import (
+    BETTER,
+    CHOSEN,
+    COLUMNS,
+    NO_SEARCH,
+    SEEDS,
+    TUNED,
+    SettingsSearch,
+    format_value,
+    searched_of,
+)
 from crosscheck2d.reports.tune.score import (
     FLOOR,
     HARMS,
@@ -24,17 +35,6 @@ from crosscheck2d.reports.tune.score import (
     measured,
     of_run,
     posed,
-)
-from crosscheck2d.reports.tune.search import (
-    BETTER,
-    CHOSEN,
-    COLUMNS,
-    NO_SEARCH,
-    SEEDS,
-    TUNED,
-    SettingsSearch,
-    searched_of,
-    shown,
 )
 from crosscheck2d.scenarios.catalogue import SCENARIOS, scenario
 from crosscheck2d.scenarios.families.tuning import (
@@ -62,16 +62,14 @@ def start(one: Scenario) -> Array:
 
 @pytest.mark.parametrize("engine", TUNED)
 def test_what_an_adapter_matches_is_what_the_table_chose(engine: str):
-    """Setting by setting; what is in the adapter alone is not searched, and says why."""
     table, adapter = chosen(engine), searched_of(engine).chosen
 
-    assert table == {name: shown(adapter[name]) for name in table}
+    assert table == {name: format_value(adapter[name]) for name in table}
     assert set(table) == set(searched_of(engine).settings)
     assert {name for name in adapter if name not in table} <= {"skin", "restitution_threshold"}
 
 
 def test_every_value_of_the_grid_is_in_the_table_and_every_reason_is_given():
-    """Nothing is left out in silence: neither a value, nor a setting that is not searched."""
     rows = searched()
     kept = {(row["engine"], row["setting"], row["value"]) for row in rows}
 
@@ -79,7 +77,7 @@ def test_every_value_of_the_grid_is_in_the_table_and_every_reason_is_given():
     for engine in TUNED:
         what = searched_of(engine)
         for name, (values, _) in what.settings.items():
-            assert {(engine, name, shown(value)) for value in values} <= kept
+            assert {(engine, name, format_value(value)) for value in values} <= kept
         assert {(engine, name, "") for name in what.left_alone} <= kept
         assert all(set(names) <= set(what.settings) for names, *_ in what.pairs)
     assert all(row["why"] for row in rows if row["verdict"] in (CHOSEN, NO_SEARCH))
@@ -87,7 +85,6 @@ def test_every_value_of_the_grid_is_in_the_table_and_every_reason_is_given():
 
 
 def test_the_tuning_scenes_are_not_those_of_the_suite():
-    """No name and no start in common, and sizes and speeds of their own."""
     suite = [scenario(name) for name in SCENARIOS]
     mine = tuning(range(2))
 
@@ -102,7 +99,6 @@ def test_the_tuning_scenes_are_not_those_of_the_suite():
 
 
 def test_a_tuning_scene_is_the_same_for_the_same_seed_only():
-    """Sampled, and so repeatable."""
     for family in FAMILIES:
         a, again, b = one_of(family, 1), one_of(family, 1), one_of(family, 2)
         assert np.array_equal(start(a), start(again))
@@ -110,7 +106,6 @@ def test_a_tuning_scene_is_the_same_for_the_same_seed_only():
 
 
 def test_near_misses_miss_and_grazing_pairs_collide():
-    """By the exact answer: no collision of those that miss, one of every pair that grazes."""
     for miss, truth in posed(("near_miss",), (0, 1, 2)):
         assert truth is not None
         assert len(truth.collisions) == 0
@@ -136,7 +131,6 @@ THREE = posed(("flight_alone",), (0, 1, 2))
 
 @pytest.mark.parametrize("cost", [0.5, 0.8, 1.0, 1.3, 3.0, 10.0])
 def test_equal_cost_is_a_step_as_much_longer_as_it_costs(cost: float):
-    """An error of first order grows by the cost; beyond the step_sizes, too."""
     first = played(0.1)
 
     assert at_cost(first.error, cost) == pytest.approx(cost * first.error)
@@ -145,7 +139,6 @@ def test_equal_cost_is_a_step_as_much_longer_as_it_costs(cost: float):
 
 
 def test_an_error_of_no_order_gains_nothing_from_cheaper_steps_within_the_ladder():
-    """Negative control of the line above: the ladder is read, not the cost alone."""
     flat = played(0.1, order=0.0)
 
     assert at_cost(flat.error, 2.0)[:, 1:] == pytest.approx(flat.error[:, 1:])
@@ -162,7 +155,6 @@ def test_an_error_of_no_order_gains_nothing_from_cheaper_steps_within_the_ladder
     ],
 )
 def test_what_breaks_a_family_is_refused_whatever_the_error(harm: dict[str, float], words: str):
-    """Even if it is ten times as near; and what mends it is none."""
     (fault,) = faults_of(played(0.01, **harm), played(0.1), THREE)
 
     assert fault == f"flight_alone: 9 of 9 runs worse, flight_alone-0 at 16.7 ms: {words}"
@@ -171,14 +163,13 @@ def test_what_breaks_a_family_is_refused_whatever_the_error(harm: dict[str, floa
 
 
 def test_a_harm_counts_if_it_is_new_or_a_bound_larger():
-    """For every engine alike, whatever it had before: 1.9 bounds for 1 are none, 2.1 are."""
     for now, before, worse in [(1.9, 1.0, 0), (2.1, 1.0, 9), (30.0, 28.5, 9), (1.0, 0.0, 9)]:
         harms = (played(0.1, energy_gained=value) for value in (now, before))
         assert against(*harms, 1.0, THREE).harmed == worse
 
 
 def test_fewer_runs_than_a_third_of_a_family_may_get_worse_if_few_do_in_all():
-    """2 of 9 are, beside a hundred scenes in which nothing changes; alone they are above 2 %."""
+    # 2 of 9 are, beside a hundred scenes in which nothing changes; alone they are above 2 %.
     many = posed(("flight_alone", "head_on"), tuple(range(50)))
     still = np.zeros((len(many), 3, len(HARMS)))
     for runs, refused in [(2, 0), (60, 1)]:
@@ -191,8 +182,8 @@ def test_fewer_runs_than_a_third_of_a_family_may_get_worse_if_few_do_in_all():
 
 
 def test_a_collision_near_the_end_of_its_scene_is_not_judged():
-    """Without its last collision the exact answer has one less than the engine; it is judged if it
-    is far from the end, and not if the scene ends behind it."""
+    # Without its last collision the exact answer has one less than the engine; it is judged if it
+    # is far from the end, and not if the scene ends behind it.
     (scene, truth), *_ = posed(("wall_to_wall",), (0,))
     assert truth is not None
     c = truth.collisions
@@ -205,7 +196,6 @@ def test_a_collision_near_the_end_of_its_scene_is_not_judged():
 
 
 def test_a_grid_ends_beyond_the_best_value_or_where_a_setting_ends():
-    """A value chosen at an end of its grid is a limit of the setting itself."""
     ends = {
         (engine, name, value)
         for engine in TUNED
@@ -218,7 +208,7 @@ def test_a_grid_ends_beyond_the_best_value_or_where_a_setting_ends():
 
 
 def test_a_length_unit_of_two_radii_makes_spurious_collisions_in_near_misses_and_a_small_one_none():
-    """Why Box2D 3.1 may not have the length unit of the smallest error: its margin is 2 % of it."""
+    # Why Box2D 3.1 may not have the length unit of the smallest error: its margin is 2 % of it.
     scenes = posed(("near_miss",), (0, 1))
     small, large = (
         measured(partial(changed, "box2d_v3:matched", length_unit=unit), scenes)
@@ -231,8 +221,7 @@ def test_a_length_unit_of_two_radii_makes_spurious_collisions_in_near_misses_and
 
 
 def test_a_smaller_slop_brings_a_column_in_pymunk_nearer():
-    """At 1e-6 radii for 1e-2, with the position correction as it comes: less than half of the
-    error."""
+    # At 1e-6 radii for 1e-2, with the position correction as it comes: less than half of the error.
     scenes = posed(("column",), (0, 1))
     before, now = (
         measured(partial(changed, "pymunk:matched", slop=slop, bias=0.9**60), scenes)
@@ -248,7 +237,6 @@ def test_a_smaller_slop_brings_a_column_in_pymunk_nearer():
 @pytest.mark.parametrize("seeds", [SEEDS, FRESH])
 @pytest.mark.parametrize("engine", TUNED)
 def test_no_single_change_is_better_by_a_tenth(engine: str, seeds: tuple[int, ...]):
-    """On the scenes of the search, and on as many that were never searched."""
     package = TUNED[engine].package
     if package and (reason := missing(package)):
         pytest.skip(reason)
@@ -260,16 +248,14 @@ def test_no_single_change_is_better_by_a_tenth(engine: str, seeds: tuple[int, ..
 
 @pytest.mark.slow
 def test_a_search_finds_its_way_back_from_a_bad_setting(monkeypatch: pytest.MonkeyPatch):
-    """On two families: from a slop of 1 % it takes a smaller one, and from what is matched
-    nothing."""
     whole = searched_of("pymunk")
     slop = replace(whole, settings={"slop": whole.settings["slop"]}, pairs=())
-    monkeypatch.setattr("crosscheck2d.reports.tune.search.searched_of", lambda _: slop)
+    monkeypatch.setattr("crosscheck2d.reports.tune.command.searched_of", lambda _: slop)
     search = SettingsSearch("pymunk", ("column", "landing"), say=lambda _: None)
     table = search.run()
 
     assert search.chosen == PYMUNK
-    assert table[table.verdict == CHOSEN].value.tolist() == [shown(PYMUNK["slop"])]
+    assert table[table.verdict == CHOSEN].value.tolist() == [format_value(PYMUNK["slop"])]
     search.chosen["slop"] = 0.01
     trials, taken = search.sweep()
     assert taken

@@ -1,17 +1,113 @@
-"""The yardstick fails at every change that changed.toml does not state, and at no other."""
+"""What `.ci` runs: every test is played by one of the fast suite, the gate and the long run; GitHub
+runs what is run here; the yardstick fails at every change that changed.toml does not state."""
 
 from __future__ import annotations
 
 import importlib.util
+import re
+import shlex
+import subprocess
+import sys
 import tomllib
+from collections import defaultdict
+from collections.abc import Collection, Iterable
 from pathlib import Path
 
 import pytest
+from ruamel.yaml import YAML
 
-SCRIPT = Path(__file__).parents[1] / ".ci" / "yardstick.py"
+ROOT = Path(__file__).parent.parent
+
+
+def call_of(script: str) -> str:
+    """The one command in a script of `.ci` that selects tests by their marks."""
+    text = (ROOT / ".ci" / script).read_text("utf-8")
+    (call,) = re.findall(r"^(?:exec )?uv run (pytest -m .+)$", text, re.MULTILINE)
+    return call
+
+
+def selected(words: str) -> str:
+    options = shlex.split(words)
+    return options[options.index("-m") + 1]
+
+
+OPTIONS = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["pytest"]
+SUITES = {
+    "fast": selected(OPTIONS["ini_options"]["addopts"]),
+    "gate": selected(call_of("run")),
+    # it also plays every property again, with more examples
+    "long": selected(call_of("long")).removesuffix(" or hypothesis"),
+}
+
+
+def suites_of(marks: Collection[str]) -> list[str]:
+    known = defaultdict(bool, dict.fromkeys(marks, True))
+    return [name for name, words in SUITES.items() if eval(words, {"__builtins__": {}}, known)]
+
+
+def only_long(tests: Iterable[tuple[str, list[str]]]) -> set[str]:
+    """The files of which fast suite and gate play nothing; of each test its name and suites."""
+    tests = list(tests)
+    seen = {name.split("::")[0] for name, suites in tests if suites != ["long"]}
+    return {name.split("::")[0] for name, _ in tests} - seen
+
+
+def test_every_test_is_played_by_one_suite_and_none_is_the_gate_blind_to(
+    collected: list[pytest.Item],
+):
+    tests = [
+        (item.nodeid, suites_of({mark.name for mark in item.iter_markers()})) for item in collected
+    ]
+
+    assert [name for name, suites in tests if len(suites) != 1] == []
+    assert only_long(tests) == set()
+
+
+def test_the_marks_say_which_suite():
+    assert suites_of([]) == suites_of(["hypothesis", "parametrize"]) == ["fast"]
+    assert suites_of(["slow"]) == suites_of(["independent"]) == ["gate"]
+    assert suites_of(["long"]) == suites_of(["slow", "long"]) == ["long"]
+    assert suites_of(["independent", "long"]) == ["long"]
+    tests = [("a.py::one", ["fast"]), ("a.py::two", ["long"]), ("b.py::three", ["long"])]
+    assert only_long(tests) == {"b.py"}
+
+
+# The workflows.
+
+WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*"))
+CI = ROOT / ".github" / "workflows" / "ci.yml"
+
+
+def faults_of(workflow: Path) -> str:
+    words = ["check_jsonschema", "--builtin-schema", "vendor.github-workflows", str(workflow)]
+    done = subprocess.run([sys.executable, "-m", *words], capture_output=True)
+    return (done.stdout + done.stderr).decode() if done.returncode else ""
+
+
+@pytest.mark.slow
+def test_the_workflows_are_what_github_takes(tmp_path: Path):
+    assert [workflow.name for workflow in WORKFLOWS] == ["ci.yml"]
+    assert faults_of(CI) == ""
+    wrong = tmp_path / "ci.yml"
+    wrong.write_text(CI.read_text(encoding="utf-8").replace("runs-on:", "runs_on:"), "utf-8")
+    assert "runs-on" in faults_of(wrong)
+
+
+def test_they_run_the_gate_and_the_commands_of_the_readme():
+    jobs = YAML(typ="safe").load(CI.read_text(encoding="utf-8"))["jobs"]
+    runs = {
+        name: [step["run"] for step in job["steps"] if "run" in step] for name, job in jobs.items()
+    }
+    block = (ROOT / "README.md").read_text(encoding="utf-8").split("```sh\n")[1].split("```")[0]
+
+    assert runs == {"gate": ["bash .ci/run"], "readme": block.splitlines()}
+    assert jobs["readme"]["strategy"]["matrix"]["os"] == ["macos-latest", "windows-latest"]
+
+
+# The yardstick.
+
+SCRIPT = ROOT / ".ci" / "yardstick.py"
 SPEC = importlib.util.spec_from_file_location("yardstick", SCRIPT)
-assert SPEC is not None
-assert SPEC.loader is not None
 yardstick = importlib.util.module_from_spec(SPEC)
 SPEC.loader.exec_module(yardstick)
 
@@ -20,7 +116,6 @@ BASE = {"deviation/a/rms": ONE, "deviation/b/rms": ONE, "status/a": "ok", "traje
 
 
 def entry(pattern: str, count: object, direction: str, **more: object) -> str:
-    """An entry of changed.toml."""
     fields = {"pattern": pattern, "count": count, "direction": direction, "issue": 36}
     fields |= {"point": "2", "reason": "a reason"} | more
     return "[[change]]\n" + "".join(f"{key} = {value!r}\n" for key, value in fields.items())
@@ -32,7 +127,6 @@ def kinds(new: dict[str, str], changes: str = "") -> list[str]:
 
 
 def test_equal_measurements_and_new_ids_pass():
-    """Without any entry."""
     assert kinds(BASE) == []
     assert kinds(BASE | {"deviation/c/rms": ONE}) == []
 
@@ -48,12 +142,10 @@ def test_equal_measurements_and_new_ids_pass():
     ],
 )
 def test_a_change_without_an_entry_fails(changed: dict[str, str], fault: str):
-    """However small it is, and in whichever direction."""
     assert kinds(BASE | changed) == [fault]
 
 
 def test_a_missing_id_fails_and_only_gone_allows_it():
-    """ "any" is a change of a value."""
     new = {key: value for key, value in BASE.items() if key != "status/a"}
     assert kinds(new) == ["gone"]
     assert kinds(new, entry("status/*", 1, "any")) == ["gone", "count"]
@@ -61,7 +153,6 @@ def test_a_missing_id_fails_and_only_gone_allows_it():
 
 
 def test_an_entry_takes_exactly_its_count():
-    """It cannot hide more than it states, nor stay when its change is gone."""
     new = BASE | {"deviation/a/rms": TWO, "deviation/b/rms": TWO}
     assert kinds(new, entry("deviation/*/rms", 2, "higher")) == []
     assert kinds(new, entry("deviation/*/rms", 1, "higher")) == ["count"]
@@ -70,14 +161,12 @@ def test_an_entry_takes_exactly_its_count():
 
 
 def test_another_direction_or_pattern_fails():
-    """And the entry, which takes nothing then, too."""
     new = BASE | {"deviation/a/rms": TWO}
     assert kinds(new, entry("deviation/*", 1, "lower")) == ["higher", "count"]
     assert kinds(new, entry("deviation/b/*", 1, "higher")) == ["higher", "count"]
 
 
 def test_a_renamed_id_is_compared_with_its_base():
-    """A new name is no way out."""
     renamed = '[renamed]\nrms = "root_mean_square"\n'
     new = {key.replace("rms", "root_mean_square"): value for key, value in BASE.items()}
     assert kinds(new) == ["gone", "gone"]
@@ -90,13 +179,11 @@ def test_a_renamed_id_is_compared_with_its_base():
     [entry("*", "all", "any"), entry("*", 1, "up"), entry("*", 1, "any", why="so"), "[[change]]"],
 )
 def test_an_entry_that_is_no_entry_is_refused(wrong: str):
-    """A wrong type, a wrong word, a field too many, a field too few."""
     with pytest.raises(ValueError, match=r"changed\.toml, entry 1"):
         yardstick.compare(BASE, BASE, wrong)
 
 
 def test_the_kept_changes_can_be_read_and_the_base_has_every_kind():
-    """The committed files."""
     yardstick.read_changes((yardstick.KEPT / "changed.toml").read_text())
     kept = tomllib.loads((yardstick.KEPT / "base.toml").read_text())
     expected = {"deviation", "status", "trajectory", "truth", "limit", "probe", "check", "lesson"}
@@ -104,7 +191,6 @@ def test_the_kept_changes_can_be_read_and_the_base_has_every_kind():
 
 
 def test_random_scenes_are_the_same_everywhere_and_have_what_they_should():
-    """At least ten scenes of each."""
     scenes = [tomllib.loads(yardstick.random_scene(k)) for k in range(yardstick.RANDOM_SCENES)]
     assert yardstick.random_scene(7) == yardstick.random_scene(7)
     for has in (
