@@ -29,7 +29,7 @@ from crosscheck2d.reports.run.cells import Cell
 from crosscheck2d.reports.run.playing import play_cell
 from crosscheck2d.reports.run.pool import Failure, run_all
 from crosscheck2d.reports.run.scenes import open_scene, with_steps
-from crosscheck2d.reports.speed.advice import Inquiry, NoAdvice, Question
+from crosscheck2d.reports.speed.advice import Inquiry, NoAdvice, Requirement
 from crosscheck2d.reports.speed.ladder import PURPOSES
 from crosscheck2d.reports.terminal.progress import Progress
 from crosscheck2d.scenarios.files.scene_file import scenario_of, scene_text
@@ -170,8 +170,8 @@ def advise(
         file = Path(folder) / f"{scenario.name}.toml"
         file.write_text(scene_text(scenario), encoding="utf-8")
         try:
-            question = Question(str(file), 0, purpose, error)
-            advice = Inquiry(question, os.cpu_count() or 1, progress).advise(names)
+            requirement = Requirement(str(file), 0, purpose, error)
+            advice = Inquiry(requirement, os.cpu_count() or 1, progress).advise(names)
         except NoAdvice as refusal:
             raise ValueError(str(refusal)) from None
     tried = [(attempt, "") for attempt in advice.keeping]

@@ -108,7 +108,7 @@ class Attempt:
         return self.error <= bound and self.kept_in(bound) >= NINE_TENTHS * len(self.starts)
 
 
-class Question(NamedTuple):
+class Requirement(NamedTuple):
     """A scene, a key of `PURPOSES`, and how large its error may be. The methods are what a worker
     does."""
 
@@ -280,18 +280,18 @@ class Advice:
 
 @dataclass(frozen=True)
 class Inquiry:
-    """Which engine answers a question at the least cost.
+    """Which engine meets a requirement at the least cost.
 
     Raises:
         NoAdvice: the scene has no exact answer.
     """
 
-    question: Question
+    requirement: Requirement
     workers: int
     progress: Progress
 
     def __post_init__(self) -> None:
-        scene, seed, *_ = self.question
+        scene, seed, *_ = self.requirement
         try:
             scored(scene, seed)
         except NoTruth as refusal:
@@ -302,7 +302,7 @@ class Inquiry:
 
     @property
     def part(self) -> Scored:
-        return scored(self.question.scene, self.question.seed)
+        return scored(self.requirement.scene, self.requirement.seed)
 
     @property
     def ladder(self) -> tuple[int, ...]:
@@ -319,11 +319,12 @@ class Inquiry:
         Raises:
             NoAdvice: the timing failed.
         """
-        question, (scenario, truth) = self.question, self.part
+        requirement, (scenario, truth) = self.requirement, self.part
+        bound = requirement.bound
         tried = self.attempts((name, PLAIN, k) for name in names for k in self.ladder)
         ladders = {name: [each for each in tried if each.name == name] for name in names}
         keeping, partly, unsteady = self.confirmed(
-            [rest for each in ladders.values() if (rest := those_that_keep(each, question.bound))]
+            [rest for each in ladders.values() if (rest := those_that_keep(each, bound))]
         )
         at = {attempt.name: attempt.substeps for attempt in keeping}
         changed = (x for x in OPTIONS if x.engine in at)
@@ -334,10 +335,10 @@ class Inquiry:
         ended = {attempt.name for attempt in (*keeping, *partly)}
         advice = Advice(
             scenario.name,
-            question.purpose,
-            question.bound,
+            requirement.purpose,
+            bound,
             scenario.duration,
-            open_scene(question.scene, question.seed).duration,
+            open_scene(requirement.scene, requirement.seed).duration,
             len(truth.collisions),
             [scenario.dt(k) for k in self.ladder],
             sorted(plain.values(), key=lambda attempt: attempt.cost),
@@ -351,9 +352,9 @@ class Inquiry:
             busy,
         )
         libraries = [name for name, (first, *_) in ladders.items() if first.is_library]
-        if question.purpose == STATISTICS or not libraries or at.keys() & set(libraries):
+        if requirement.purpose == STATISTICS or not libraries or at.keys() & set(libraries):
             return advice
-        averages = replace(self, question=question._replace(purpose=STATISTICS))
+        averages = replace(self, requirement=requirement._replace(purpose=STATISTICS))
         return replace(advice, statistics=averages.advise(libraries))
 
     def attempts(self, asked: Iterable[tuple[str, str, int]]) -> list[Attempt]:
@@ -363,11 +364,11 @@ class Inquiry:
             replace(attempt, error=inf, reason=f"{outcome.status}: {outcome.reason}")
             if isinstance(outcome, Failure)
             else outcome
-            for attempt, outcome in self.outcomes(wanted, self.question.play, "playing")
+            for attempt, outcome in self.outcomes(wanted, self.requirement.play, "playing")
         ]
 
     def from_every_start(self, wanted: Sequence[Attempt], every: int = 1) -> list[Attempt]:
-        play = partial(self.question.play_starts, every=every)
+        play = partial(self.requirement.play_starts, every=every)
         what = f"playing from {STARTS // every} instants of a step"
         return [
             replace(attempt, starts=(inf,) * STARTS) if isinstance(outcome, Failure) else outcome
@@ -378,7 +379,7 @@ class Inquiry:
         """The attempts that play the whole scene and fail no verdict in it; and those that do not,
         each with the reason."""
         able, unable = list[Attempt](), list[Attempt]()
-        play = self.question.play_to_the_end
+        play = self.requirement.play_to_the_end
         for attempt, outcome in self.outcomes(wanted, play, "playing to the end"):
             if isinstance(outcome, Failure):
                 outcome = replace(attempt, reason=f"{outcome.status}: {outcome.reason}")
@@ -405,7 +406,7 @@ class Inquiry:
             passed, failed = self.to_the_end([ladder[0] for ladder in ladders])
             again = list[str]()
             for attempt in self.from_every_start(passed):
-                if attempt.holds(self.question.bound):
+                if attempt.holds(self.requirement.bound):
                     able.append(attempt)
                 elif attempt.name in finer:
                     again.append(attempt.name)
@@ -435,7 +436,7 @@ class Inquiry:
         makes = {(attempt.task, attempt.substeps, 0): attempt.make for attempt in played}
         twice = [attempt for attempt in played if attempt.change == PLAIN]
         makes |= {(attempt.task, attempt.substeps, 1): attempt.make for attempt in twice}
-        scene, seed, *_ = self.question
+        scene, seed, *_ = self.requirement
         task = partial(times_of, scene, seed, makes, ROUNDS, BUDGET, whole=True)
         busy = busy_cores()
         [(_, samples)] = done({("time",): task}, 1, self.progress, "timing", ALL_ROUNDS)
@@ -461,7 +462,7 @@ class Inquiry:
         best = [min(each, key=lambda x: inf if isnan(x.error) else x.error) for each in ladders]
         usual = [next((x for x in each if x.dt <= dt), each[-1]) for each in ladders]
         longest = [max(each, key=lambda x: (reach(x), x.dt)) for each in ladders]
-        if self.question.purpose in LASTING:
+        if self.requirement.purpose in LASTING:
             lasting = dict.fromkeys(x for x in (*usual, *longest) if not isnan(x.until))
             until = {x.task: x for x in (*self.from_every_start([*lasting]), *unsteady.values())}
             usual, longest = ([until.get(x.task, x) for x in each] for each in (usual, longest))
@@ -470,7 +471,7 @@ class Inquiry:
             if isfinite(least.error):
                 at = next(attempt for attempt in ladder if attempt.error <= 2 * least.error)
                 bits = row_of(least.name).bits_of or least.name  # what plays the same
-                tasks[least.task] = partial(self.question.find_cause, bits, at.substeps)
+                tasks[least.task] = partial(self.requirement.find_cause, bits, at.substeps)
         causes = dict(done(tasks, self.workers, self.progress, "cause of the error", SEARCH))
         rows = []
         for row in zip(best, (ladder[-1].error for ladder in ladders), usual, longest):
@@ -482,8 +483,8 @@ class Inquiry:
             if name in unsteady:
                 reason = (
                     f"at {number(1e3 * unsteady[name].dt)} ms it keeps the error from"
-                    f" {unsteady[name].kept_in(self.question.bound)} of {STARTS} instants of a step"
-                    f" only; {reason}"
+                    f" {unsteady[name].kept_in(self.requirement.bound)} of {STARTS} instants of a"
+                    f" step only; {reason}"
                 )
             rows.append(OutOfReach(*row, reason))
         return rows

@@ -25,7 +25,7 @@ from crosscheck2d.reports.speed.advice import (
     Inquiry,
     NoAdvice,
     OutOfReach,
-    Question,
+    Requirement,
     reach,
 )
 from crosscheck2d.reports.speed.ladder import PURPOSES, STARTS
@@ -50,8 +50,8 @@ def give_advice(
     names = told_apart(rows, open_scene(checked, seed).scene)
     with Progress() as progress:
         try:
-            question = Question(checked, seed, purpose, bound)
-            advice = Inquiry(question, os.cpu_count() or 1, progress).advise(names)
+            requirement = Requirement(checked, seed, purpose, bound)
+            advice = Inquiry(requirement, os.cpu_count() or 1, progress).advise(names)
         except NoAdvice as reason:
             say(f"{scene}: {reason}")
             sys.exit(FAILED)

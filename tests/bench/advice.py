@@ -20,7 +20,7 @@ from crosscheck2d.reports.speed.advice import (
     LOUD,
     Inquiry,
     NoAdvice,
-    Question,
+    Requirement,
     those_that_keep,
 )
 from crosscheck2d.reports.speed.plan import PLAIN
@@ -45,8 +45,8 @@ def main(scenes: list[str]) -> int:
 
 
 def measured_anew(scene: str, progress: Progress) -> tuple[str, bool]:
-    question = Question(scene, SEED, PURPOSE, BOUND)
-    asked = Inquiry(question, os.cpu_count() or 1, progress)
+    requirement = Requirement(scene, SEED, PURPOSE, BOUND)
+    asked = Inquiry(requirement, os.cpu_count() or 1, progress)
     advice = asked.advise(list(ENGINES))
     keeping = []
     for name in ENGINES:

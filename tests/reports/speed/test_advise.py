@@ -34,7 +34,7 @@ from crosscheck2d.reports.speed.advice import (
     Attempt,
     ChangedOption,
     Inquiry,
-    Question,
+    Requirement,
     those_that_keep,
 )
 from crosscheck2d.reports.speed.advise import print_advice, sentence_on_times
@@ -135,11 +135,13 @@ def test_what_a_step_keeps_by_luck_is_not_kept_from_nine_tenths_of_its_starts():
     # from most starts it is off by more than 0.01. Half of that step keeps it from all.
     scene = str(SCENES / "one_bounce.toml")
     dt = scored(scene, 0).scenario.dt
-    question = Question(scene, 0, "trajectory", 0.01)
-    coarse, fine = (question.play_starts(question.play(attempt(k, dt(k), nan))) for k in (128, 256))
+    requirement = Requirement(scene, 0, "trajectory", 0.01)
+    coarse, fine = (
+        requirement.play_starts(requirement.play(attempt(k, dt(k), nan))) for k in (128, 256)
+    )
 
     untils = [
-        begin + question.play_part(part, coarse).until
+        begin + requirement.play_part(part, coarse).until
         for begin, part in starts_within_a_step(scene, 0, coarse.dt)
     ]
 
@@ -155,8 +157,8 @@ def test_what_a_step_keeps_by_luck_is_not_kept_from_nine_tenths_of_its_starts():
 def test_until_when_an_error_is_kept_is_the_last_sample_before_it_is_not():
     scene = str(SCENES / "airhockey.toml")
     scenario, truth = scored(scene, 0)
-    question = Question(scene, 0, "trajectory", 0.01)
-    played = question.play(attempt(2, scenario.dt(2), nan))
+    requirement = Requirement(scene, 0, "trajectory", 0.01)
+    played = requirement.play(attempt(2, scenario.dt(2), nan))
     trajectory = play(ENGINES["pymunk:matched"].make(), "pymunk:matched", scenario, played.dt)
     off = np.linalg.norm(trajectory.trajectory.position - truth.position, axis=2)
     first = int(np.argmax((off / scenario.scene.radius).max(axis=1) > 0.01))
@@ -168,10 +170,10 @@ def test_until_when_an_error_is_kept_is_the_last_sample_before_it_is_not():
 def test_an_engine_that_stops_before_the_end_of_the_scene_is_no_advice():
     # In a column the collisions accumulate: `event_driven` refuses to go on.
     dt = open_scene("column_of_ten", 0).dt(1)
-    question = Question("column_of_ten", 0, "trajectory", 0.01)
+    requirement = Requirement("column_of_ten", 0, "trajectory", 0.01)
     names = "event_driven:float64", "box2d:matched"
     with Progress() as progress:
-        inquiry = Inquiry(question, 1, progress)
+        inquiry = Inquiry(requirement, 1, progress)
         able, partly = inquiry.to_the_end([Attempt(name, PLAIN, 1, dt, 0.0) for name in names])
 
     assert [one.name for one in able] == ["box2d:matched"]
@@ -249,7 +251,7 @@ def test_every_purpose_sees_an_engine_that_is_wrong(purpose: str, control: type)
 def test_a_ladder_begins_at_the_steps_of_the_scene_and_halves_them():
     for name in SCENARIOS:
         scenario = open_scene(name, 0)
-        steps = Inquiry(Question(name, 0, "trajectory", 0.01), 1, Progress()).ladder
+        steps = Inquiry(Requirement(name, 0, "trajectory", 0.01), 1, Progress()).ladder
         assert steps[0] == scenario.substeps[0]
         assert len(steps) >= 2
         assert all(fine == 2 * coarse for coarse, fine in pairwise(steps))
@@ -329,7 +331,7 @@ def test_an_engine_whose_disk_is_through_the_floor_is_not_advised(name: str):
     names = ("reference:exercise", "reference:coulomb", "pymunk:matched")
     dt = open_scene(scene, 0).dt
     with Progress() as progress:
-        inquiry = Inquiry(Question(scene, 0, "trajectory", inf), 2, progress)
+        inquiry = Inquiry(Requirement(scene, 0, "trajectory", inf), 2, progress)
         ladders = [[Attempt(name, PLAIN, k, dt(k), 0.01) for k in (1, 2)] for name in names]
         able, unable, _ = inquiry.confirmed(ladders)
 
