@@ -90,7 +90,11 @@ def test_with_the_scenes_of_before_one_scene_was_the_pooled_curve():
 
 @pytest.mark.long  # ten engines through fourteen scenes
 def test_no_one_scene_is_the_pooled_curve_of_any_engine():
-    assert most_moved(errors_of(QUICK.scenes, tuple(ENGINES))) < MOST
+    # a point that more than a quarter of failed scenes put at infinity is not drawn
+    errors = errors_of(QUICK.scenes, tuple(ENGINES))
+    drawn = {key: each for key, each in errors.items() if np.isfinite(middle_half(each))}
+    assert len(drawn) > 0.9 * len(errors)
+    assert most_moved(drawn) < MOST
 
 
 def points(costs: list[float], errors: list[float]) -> pd.DataFrame:

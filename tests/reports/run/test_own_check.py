@@ -90,7 +90,7 @@ def test_a_run_says_what_check_says(tmp_path: Path):
     assert FAULTY.cause in first
     assert first in " ".join(done.stdout.split())
     assert html.escape(first) in page.replace("&#39;", "'")
-    assert "<li>exercise: <code>" in page
+    assert "<small>line " in page
     assert f"crosscheck check {path.name}" in page
     assert {row["status"] for row in rows if row["engine"] == path.name} == {"ok"}
     assert again.returncode == 0, again.stderr

