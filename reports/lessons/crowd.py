@@ -46,9 +46,7 @@ def crowd(count: int, fill: float) -> Scenario:
         position=(field + 0.5) * width - half + rng.uniform(-1, 1, (count, 2)) * (width / 2 - r),
         velocity=rng.normal(size=(count, 2)),
         radius=np.full(count, r),
-        mass=np.ones(count),
         walls=box([-half, -half], [half, half]),
-        restitution=1.0,
     )
     return Scenario("crowd", "What does a step cost?", "", scene, 0.25, 1 / 60)
 

@@ -38,7 +38,7 @@ def two(restitution: float, ratio: float, offset: float) -> Scenario:
     scene = lay_out(
         position=[[-1.2, 0.5 * offset], [0.4, 0.0]],
         velocity=[[1.5, 0.0], [-0.5, 0.0]],
-        radius=[0.5, 0.5],
+        radius=0.5,
         mass=[1.0, ratio],
         restitution=restitution,
     )

@@ -68,10 +68,8 @@ def mean_squared_error_of(name: str, dt: float) -> float:
     step, as in the publication."""
     scene = lay_out(
         position=[[0.0, HEIGHT]],
-        velocity=[[0.0, 0.0]],
-        radius=[RADIUS],
-        mass=[MASS],
-        restitution=1.0,
+        radius=RADIUS,
+        mass=MASS,
         gravity=[0.0, -GRAVITY],
         walls=[[[-1.0, 0.0], [1.0, 0.0]]],
     )

@@ -77,7 +77,9 @@ def overheads(make: Make, scenario: Scenario) -> list[tuple[str, Callable[[], Sp
 
 def empty_world() -> Scene:
     return lay_out(
-        position=[[0, 0]], velocity=[[0, 0]], radius=[1.0], mass=[float("inf")], restitution=1.0
+        position=[[0, 0]],
+        radius=1.0,
+        mass=float("inf"),
     )
 
 

@@ -39,9 +39,7 @@ def gas(n: int, seed: int) -> Scene:
         position=place,
         velocity=np.random.default_rng(seed).normal(size=(n, 2)),
         radius=np.full(n, RADIUS),
-        mass=np.ones(n),
         walls=box([0.0, 0.0], [side, side]),
-        restitution=1.0,
     )
 
 
@@ -51,9 +49,7 @@ def pile(n: int) -> Scene:
     side = 2 * RADIUS * across
     return lay_out(
         position=(np.stack(np.divmod(np.arange(n), across), axis=-1) + 0.5) * 2 * RADIUS,
-        velocity=np.zeros((n, 2)),
         radius=np.full(n, RADIUS),
-        mass=np.ones(n),
         gravity=[0.0, -10.0],
         walls=box([0.0, 0.0], [side, 2 * side]),
         restitution=0.0,

@@ -240,8 +240,7 @@ def test_plain_python_gives_the_same_bits_as_the_compiled_solver():
 ROW = lay_out(
     position=[[x, 0.5] for x in (0.0, 1.0, 2.0, 5.0, 6.0)],
     velocity=[[0.0, -1.0]] * 5,
-    radius=[0.5] * 5,
-    mass=[1.0] * 5,
+    radius=0.5,
     walls=[[[-2.0, 0.0], [9.0, 0.0]]],
     restitution=0.0,
 )

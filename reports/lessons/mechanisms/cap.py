@@ -37,8 +37,7 @@ def show_cap(cap: float, k: int) -> Shown:
     scene = lay_out(
         position=np.column_stack([np.zeros(15), np.arange(15.0)]),
         velocity=np.column_stack([given, np.zeros(15)]),
-        radius=np.full(15, 0.2),
-        mass=np.ones(15),
+        radius=0.2,
         restitution=0.0,
     )
     scenario = asked(scene, 0.1)

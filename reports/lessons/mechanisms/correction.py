@@ -29,7 +29,7 @@ def show_position_correction(share: float, slop: float) -> Shown:
     """How an overlap that is there at the start is undone."""
     x, still = [[0.0, 0.0], [0.8, 0.0]], np.zeros((2, 2))
     scenario = asked(
-        lay_out(position=x, velocity=still, radius=[0.5] * 2, mass=[np.inf, 2.0], restitution=0.0),
+        lay_out(position=x, velocity=still, radius=0.5, mass=[np.inf, 2.0], restitution=0.0),
         0.4,
     )
     corrects = ablated(order=BOX2D, correction_most=0.2, correction_share=share, slop=slop / 1e3)

@@ -33,9 +33,7 @@ PRECISION = {53: np.float64, 24: np.float32}
 def show_digits(digits: int, far: float) -> Shown:
     """How far a disk far out is from x + v t."""
     start, v = np.array([far, 0.0]), np.array([1.0, 0.3])
-    scenario = asked(
-        lay_out(position=[start], velocity=[v], radius=[0.5], mass=[1.0], restitution=0.0), 2.0
-    )
+    scenario = asked(lay_out(position=[start], velocity=[v], radius=0.5, restitution=0.0), 2.0)
     played = Simulation.by(scenario, NAMES, 4, ablated(precision=PRECISION[digits]))
     exact = start + scenario.times[:, None] * v
     *engines, _ = played.curves(

@@ -40,7 +40,6 @@ def pairs(closing: Array, restitution: float, friction: float = 0.0, spin: float
         position=x.reshape(-1, 2),
         velocity=v.reshape(-1, 2),
         radius=np.full(2 * k, r),
-        mass=np.ones(2 * k),
         angular_velocity=np.full(2 * k, spin),
         restitution=restitution,
         friction=friction,

@@ -60,9 +60,7 @@ def struck(n: int, gap: float) -> Scenario:
     scene = lay_out(
         position=np.column_stack([[-2.01, *((1.0 + gap) * np.arange(n))], np.zeros(n + 1)]),
         velocity=[[5.0, 0.0], *[[0.0, 0.0]] * n],
-        radius=np.full(n + 1, 0.5),
-        mass=np.ones(n + 1),
-        restitution=1.0,
+        radius=0.5,
     )
     return asked(scene, 1.0)
 

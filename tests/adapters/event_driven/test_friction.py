@@ -117,9 +117,9 @@ def test_engine_and_oracle_agree_on_a_box_of_frictional_disks(seed: int, restitu
 
 ROLL = lay_out(
     position=[[0.0, 0.5]],
-    velocity=[[3.0, 0.0]],
-    radius=[0.5],
-    mass=[2.0],
+    velocity=[3.0, 0.0],
+    radius=0.5,
+    mass=2.0,
     restitution=0.5,
     friction=0.25,
     walls=FLOOR,
@@ -171,10 +171,8 @@ def test_what_rolls_has_no_slip_left_in_any_digit():
 TWO_CONTACTS = {
     "a corner": lay_out(
         position=[[0.5, 0.5]],
-        velocity=[[0.0, 0.0]],
         angular_velocity=[5.0],
-        radius=[0.5],
-        mass=[1.0],
+        radius=0.5,
         restitution=0.0,
         friction=0.25,
         walls=[[[0.0, 0.0], [9.0, 0.0]], [[0.0, 0.0], [0.0, 9.0]]],
@@ -182,9 +180,7 @@ TWO_CONTACTS = {
     ),
     "a disk on another": lay_out(
         position=[[0.0, 0.5], [0.0, 1.5]],
-        velocity=[[0.0, 0.0], [0.0, 0.0]],
-        radius=[0.5, 0.5],
-        mass=[1.0, 1.0],
+        radius=0.5,
         restitution=0.0,
         friction=0.25,
         walls=FLOOR,

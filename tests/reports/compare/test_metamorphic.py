@@ -71,9 +71,8 @@ SCENES: dict[str, Callable[[], Scenario]] = {
         lay_out(
             position=[[-0.5, 0.0], [0.5, 0.0], [0.0, 1.0], [0.0, -1.0]],
             velocity=[[1.0, 0.0], [-1.0, 0.0], [0.0, 2.0], [0.0, 0.0]],
-            radius=[0.1] * 4,
+            radius=0.1,
             mass=[1.0, 1.0, 2.0, np.inf],
-            restitution=1.0,
             walls=box([-1.1, -1.7], [1.1, 1.7]),
         ),
         3.0,

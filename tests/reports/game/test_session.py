@@ -53,14 +53,7 @@ def test_saving_before_flying_is_reported():
 
 
 def test_another_scene_with_a_wrap_is_played_as_the_harness_plays_it():
-    scene = lay_out(
-        position=[[3.0, 1.5]],
-        velocity=[[1.0, 0.0]],
-        radius=[0.25],
-        mass=[1.0],
-        restitution=1.0,
-        wrap=[[0, 0], [4, 3]],
-    )
+    scene = lay_out(position=[[3.0, 1.5]], velocity=[1.0, 0.0], wrap=[[0, 0], [4, 3]])
     scenario = Scenario("through-the-edge", "Does it come back?", "", scene, 6.0, 0.125)
     session = Session(["reference:exercise"], scenario)
     session.flight.advance(scenario.intervals)

@@ -49,7 +49,10 @@ from crosscheck2d.scenarios.families.placing import lay_out
 from crosscheck2d.scenarios.model import Scenario, Trajectory
 from tests.reports.stability.kept_limits import quick_limit
 
-SCENE = lay_out(position=[[0, 0]], velocity=[[0, 0]], radius=[1.0], mass=[1.0], restitution=1.0)
+SCENE = lay_out(
+    position=[[0, 0]],
+    radius=1.0,
+)
 TOO_FAST = Predicate(
     "too fast",
     "the speed is above 1",
