@@ -31,7 +31,7 @@ import psutil
 
 from crosscheck2d.adapters import system
 from crosscheck2d.adapters.safe_path import OwnPackages, keep_path_safe
-from crosscheck2d.reports.terminal.exits import refuse, say
+from crosscheck2d.reports.terminal.exits import refuse, say, signal_status
 
 TIMEOUT = 60.0  # s a task may take
 STARTING = 120.0  # s for a process to start and to import the modules of a task, on a busy machine
@@ -291,6 +291,8 @@ class Pool:
     def ended(self, seconds: float) -> list[tuple[Any, bytes, Any]]:
         """Key, pickled task and outcome of the tasks that end within `seconds`, or before that as
         soon as one does."""
+        if signal_status():  # Python drops the exception of a handler that ran in a destructor
+            raise KeyboardInterrupt
         lines = [line for one in self.busy for line in (one.connection, one.process.sentinel)]
         ends = [worker.end - monotonic() for worker in self.busy]
         wait(lines, max(0.0, min([seconds, LOOK, *ends])))

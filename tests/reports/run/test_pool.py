@@ -321,3 +321,10 @@ def test_a_trajectory_comes_back_from_its_file_bit_for_bit():
         assert getattr(here, name).tobytes() == getattr(there, name).tobytes()
     for name in ("t", "i", "j", "impulse"):
         assert getattr(here.collisions, name).tobytes() == getattr(there.collisions, name).tobytes()
+
+
+def test_a_signal_whose_exception_was_lost_ends_the_tasks(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("crosscheck2d.reports.run.pool.signal_status", lambda: 130)
+    with pytest.raises(KeyboardInterrupt):
+        list(run_all(cells(GOOD), 2))
+    assert not multiprocessing.active_children()
