@@ -78,6 +78,8 @@ def scene(source: SceneLike | None = None, seed: int = 0, **table: Any) -> Shown
     Raises:
         ValueError: with a line for each fault.
     """
+    if source is not None and table:
+        raise ValueError(f"{source} is a whole scene: it cannot be given {', '.join(table)}")
     if source is None:
         found = scenario_of(table, "scene")
     elif isinstance(source, Scenario):

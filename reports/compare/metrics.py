@@ -1,6 +1,6 @@
 """The metrics: the function, the unit, and what each is measured against.
 
-To add one, write `def name(view) -> Value | None` and its row in `METRICS`. A metric that does not
+To add one, write `def name(view) -> Value | None` and its row in `ROWS`. A metric that does not
 apply to a scene returns None. CONTRIBUTING.md says which tests it must pass.
 """
 
@@ -193,7 +193,7 @@ def _largest_of_disks(values: Array, view: View) -> Value:
 
 @dataclass(frozen=True)
 class Metric:
-    """A row of `METRICS`.
+    """A row of `ROWS`.
 
     Attributes:
         of: the function; its name is that of the metric.
@@ -201,7 +201,7 @@ class Metric:
         against: what it is measured against: `ITSELF`, `TRUTH`, `ENGINE` (against.py).
         title: the heading in tables; "": the name itself.
         summary: what the number is; `crosscheck list metrics` prints it.
-        better: "lower", "higher", "zero" or "as stated" (the best value).
+        better: the best value: "lower", "higher", "zero", or "as stated" where none is best.
     """
 
     of: Callable[[View], Value | None]

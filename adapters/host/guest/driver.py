@@ -125,7 +125,9 @@ class Fields:
         self.__dict__.update(values)
 
     def __getattr__(self, name: str) -> Any:  # only called for a missing name
-        raise AttributeError(f"a sphere has no field {name!r}", name=name, obj=self)
+        raise AttributeError(
+            f"no field {name!r}; there are: {', '.join(self.__dict__)}", name=name, obj=self
+        )
 
     def __getitem__(self, name: str) -> Any:
         return self.__dict__[name]

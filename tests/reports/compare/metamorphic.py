@@ -177,10 +177,13 @@ class Change:
             "s": self.time,
             "rad/s": 1 / self.time,
             "N s": self.mass * self.length / self.time,
+            "J": self.mass * self.length**2 / self.time**2,
         }
-        return rates.get(unit, 1.0)
+        return 1.0 if unit in PLAIN else rates[unit]
 
 
+# units that no change of scale touches; a unit that is neither here nor in `factor` is a KeyError
+PLAIN = ("1", "%", "rad", "radii", "dt", "disks", "collisions", "g", "sqrt(g R)", "of the run")
 CUT = 0.37  # of each wall
 
 
