@@ -65,7 +65,7 @@ def test_a_scene_is_opened_by_name_from_a_file_or_from_its_keys(tmp_path: Path):
     assert "<svg" in pair._repr_html_().replace("&lt;", "<")
     with pytest.raises(ValueError, match=r"slow_colision.*did you mean slow_collision"):
         crosscheck2d.scene("slow_colision")
-    with pytest.raises(ValueError, match="slow_collision is a whole scene: .* restitution"):
+    with pytest.raises(ValueError, match=r"slow_collision is a whole scene: .* restitution"):
         crosscheck2d.scene("slow_collision", restitution=0.5)
     with pytest.raises(ValueError, match=r"radius = 0.*\n.*mass = -1"):
         crosscheck2d.scene(**TABLE | {"disk": [TABLE["disk"][0] | {"mass": -1, "radius": 0}]})
