@@ -132,8 +132,9 @@ def penetration(trajectory: Trajectory, scene: Scene) -> Array:
 
 def nearest_on_segment(x: Array, start: Array, end: Array) -> Array:
     """(k, 2) m, the points of the segment nearest to x (k, 2)."""
-    along = np.clip((x - start) @ (end - start) / ((end - start) @ (end - start)), 0, 1)
-    return start + along[:, None] * (end - start)
+    span = end - start
+    along = np.clip((x - start) @ span / (span @ span or 1.0), 0, 1)  # it may be a point
+    return start + along[:, None] * span
 
 
 def contact_normal(x: Array, scene: Scene, i: int, j: int) -> Array:

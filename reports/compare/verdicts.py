@@ -262,8 +262,9 @@ class Judge:
         moved, gained = x[k + 1, disk] - x[k, disk], scene.gravity * self.interval
         for velocity in (v[k, disk], v[k + 1, disk] - gained):
             # symplectic Euler falls by g dt2 in a step, explicit Euler by none
-            fall = np.linspace(velocity, velocity + gained, 21) * self.interval
-            if laws.lengths(fall - moved).min() <= MOST_OVERLAP * scene.radius[disk]:
+            ends = velocity * self.interval, (velocity + gained) * self.interval
+            nearest = laws.nearest_on_segment(moved[None], *ends)[0]
+            if laws.lengths(nearest - moved) <= MOST_OVERLAP * scene.radius[disk]:
                 return True
         return False
 
