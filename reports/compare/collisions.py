@@ -74,7 +74,7 @@ def on_faces(trajectory: Trajectory, scene: Scene) -> Collisions:
     # the walls of the surface that are touched at once
     at_once = np.split(touched, np.flatnonzero(~again) + 1)
     for k, before, after in zip(np.flatnonzero(~again), at_once, at_once[1:]):
-        if pair[k] and not np.intersect1d(before, after).size:
+        if pair[k] and set(before).isdisjoint(after):
             wall = scene.walls[-1 - j[order[k]]]
             span = (float(t[k]), float(t[k + 1]))
             again[k] = slides(trajectory, scene, int(collisions.i[order[k]]), wall, span)
