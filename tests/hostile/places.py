@@ -103,9 +103,6 @@ WITH_OPTIONS = [
     for what, (environment, codes) in INTERPRETER_OPTIONS.items()
 ]
 TRAP = "open('trapped.txt', 'w').write('foreign code ran')\n"
-SHADOWS = {
-    f"shadow/{name}.py": TRAP for name in ("scenarios", "adapters", "reports", "reference_impl")
-}
 PATHS = [
     Input(
         "truth: an empty entry in the path, beside modules of Python's names",

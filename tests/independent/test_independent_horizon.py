@@ -36,7 +36,6 @@ Record = Callable[[str, object], None]
 SAMPLES = 8
 LEAST, MOST = 0.33, 1.81  # of the root mean square of eight samples over its expectation
 BILLIONTH = 1e-9
-ULP = np.spacing
 FAR = 10**6  # events: none of these motions has as many
 EPS = 2.0**-52
 GASES, SUITE = 8, ("asteroids", "falling_box")

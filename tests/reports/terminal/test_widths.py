@@ -35,9 +35,9 @@ def lines_of(done: Done) -> list[str]:
 
 
 def faults(lines: list[str], columns: int) -> list[str]:
-    # settings to copy, which stand in by four, are never broken
-    text = [line for line in lines if not line.startswith("    ")]
-    return [line for line in text if cell_len(line) > columns or "…" in line]
+    code = "The settings that were run:"  # to copy, so that its lines are never broken
+    text = lines[: lines.index(code)] if code in lines else lines
+    return [line for line in text if cell_len(line) > columns] + [x for x in lines if "…" in x]
 
 
 def words_of(text: str) -> set[str]:

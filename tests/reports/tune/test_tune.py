@@ -243,9 +243,10 @@ def test_no_single_change_is_better_by_a_tenth(engine: str, seeds: tuple[int, ..
     search = SettingsSearch(engine, seeds=seeds)
     changes = [change for group in search.groups() for change in group if len(change) == 1]
     better = [trial.change for trial in map(search.trial, changes) if trial.verdict == BETTER]
-    # of some twenty changes one or two pass by chance where none was chosen, but not twice
-    again = SettingsSearch(engine, seeds=MORE if seeds == FRESH else seeds)
-    assert not [change for change in better if again.trial(change).verdict == BETTER]
+    if seeds == FRESH:  # of some twenty changes one or two are better by chance, but not twice
+        again = SettingsSearch(engine, seeds=MORE)
+        better = [change for change in better if again.trial(change).verdict == BETTER]
+    assert not better
 
 
 @pytest.mark.slow
