@@ -46,9 +46,9 @@ def _searched(module: str) -> Searched:
 
 
 def _javascript_searched(name: str) -> Searched:
-    from crosscheck2d.adapters.host.searched import SEARCHED
+    from crosscheck2d.adapters.host.searched import searched_of
 
-    return SEARCHED[name]
+    return searched_of(name)
 
 
 def _javascript(name: str, profile: str, **settings: Any) -> Engine:

@@ -169,7 +169,15 @@ def sphere_of(r: Sequence[float]) -> Fields:
     return Fields(**vectors, **dict(zip(SCALARS, r[6:])))
 
 
-NAMES = frozenset(vars(sphere_of([0.0] * 12)))
+NAMES = frozenset((*VECTORS, *SCALARS))
+
+
+def put(sphere: Any, r: Sequence[float]) -> None:
+    for name, x, y in zip(VECTORS, r[:6:2], r[1:6:2]):
+        vector = getattr(sphere, name)
+        vector.x, vector.y = x, y
+    for name, x in zip(SCALARS, r[6:]):
+        setattr(sphere, name, x)
 
 
 def row_of(s: Any) -> list[float]:
@@ -181,6 +189,10 @@ def row_of(s: Any) -> list[float]:
             "a sphere is left with a position, velocity or force that has no x and y"
         ) from None
     return [*map(number, numbers), *(number(getattr(s, name)) for name in SCALARS)]
+
+
+def everybody(module: ModuleType) -> list[Any]:
+    return [module.ufo, *module.asteroids]
 
 
 def number(x: Any) -> float:
@@ -328,16 +340,11 @@ def as_functions(module: ModuleType) -> dict[str, Callable[..., Any]]:
         try:
             module.advance(disks, where, dt, 1)
         finally:  # the state at a failure is judged, too
-            for k, s in enumerate(spheres):
-                s.position.x, s.position.y = map(float, disks.position[k])
-                s.velocity.x, s.velocity.y = map(float, disks.velocity[k])
-                s.force.x, s.force.y = map(float, disks.force[k])
-                s.alpha, s.angularVelocity = float(disks.angle[k]), float(disks.angular_velocity[k])
-                s.torque, s.size = float(disks.torque[k]), float(disks.radius[k])
-                s.mass, s.MoI = float(disks.mass[k]), float(disks.inertia[k])
-
-    def everybody() -> list[Any]:
-        return [module.ufo, *module.asteroids]
+            d = disks
+            turning = (d.angle, d.angular_velocity, d.torque, d.mass, d.inertia, d.radius)
+            after = np.column_stack([d.position, d.velocity, d.force, *turning])
+            for s, row in zip(spheres, after.tolist()):
+                put(s, row)
 
     def begin() -> None:
         places = [(-4.0 + 2.0 * (k % 5), -2.2 + 1.2 * (k // 5)) for k in range(20)]
@@ -348,8 +355,8 @@ def as_functions(module: ModuleType) -> dict[str, Callable[..., Any]]:
     return {
         "integrate": lambda sphere, dt: act([sphere], world, dt),
         "collide": lambda a, b: act([a, b], world, 0.0),
-        "simulate": lambda dt: act(everybody(), boxed, dt),
-        "wrap": lambda: act(everybody(), boxed, 0.0),
+        "simulate": lambda dt: act(everybody(module), boxed, dt),
+        "wrap": lambda: act(everybody(module), boxed, 0.0),
         "begin": begin,
     }
 
@@ -550,14 +557,11 @@ class PythonGuest:
     def guarded(self, limit: float, when: str) -> Iterator[None]:
         """Context that turns every exception of the file into `Failed`, and stops it after
         `limit` s of processor time, or `PATIENCE` times as many by the clock."""
-
         began = process_time()
-
-        def too_late() -> Failed:
-            return stopped(limit, process_time() - began, when)
-
         try:
-            with system.stopped_after(limit, PATIENCE * limit, too_late):
+            with system.stopped_after(
+                limit, PATIENCE * limit, lambda: stopped(limit, process_time() - began, when)
+            ):
                 yield
         except BaseException as error:  # SystemExit too: a guest may not end the process
             failure = error if isinstance(error, Failed) else self.failure(error, when)
@@ -600,12 +604,9 @@ class PythonGuest:
         if "begin" in self.file:
             self.file["begin"]()
 
-    def everybody(self) -> list[Any]:
-        return [self.module.ufo, *self.module.asteroids]
-
     def globals(self) -> list[list[float]] | None:
         try:
-            return [row_of(s) for s in self.everybody()]
+            return [row_of(s) for s in everybody(self.module)]
         except (AttributeError, TypeError):
             return None
 
@@ -628,7 +629,7 @@ class PythonGuest:
                     )
                 returned = returned or isinstance(result, (Fields, dict, list, tuple))
                 returned = returned or hasattr(result, "position")
-                spheres = self.everybody() if question["world"] else spheres
+                spheres = everybody(self.module) if question["world"] else spheres
                 states.append([row_of(s) for s in spheres])
         except (Failed, system.TimeIsUp):
             raise
@@ -701,17 +702,11 @@ class PythonGuest:
         return Traced(access, vars(sphere))
 
     def placed(self, question: dict[str, Any]) -> list[Any]:
-        made = [sphere_of(r) for r in question["spheres"]]
         if not question["world"]:
-            return made
-        spheres = self.everybody()
-        for mine, wanted in zip(spheres, made):
-            for name, value in vars(wanted).items():
-                if isinstance(value, Fields):
-                    vector = getattr(mine, name)
-                    vector.x, vector.y = value.x, value.y
-                else:
-                    setattr(mine, name, value)
+            return [sphere_of(r) for r in question["spheres"]]
+        spheres = everybody(self.module)
+        for sphere, r in zip(spheres, question["spheres"]):
+            put(sphere, r)
         return spheres
 
     # ---- whole scenes
@@ -734,22 +729,18 @@ class PythonGuest:
     def play(self, calls: list[dict[str, Any]]) -> dict[str, Any]:
         for step in calls:
             self.step(step)
-        return self.handed([self.world.read()])
+        return self.samples({"times": 0})
 
     def samples(self, argument: dict[str, Any]) -> dict[str, Any]:
-        readings = [self.world.read()]
+        numbers = self.world.read()
         for _ in range(argument["times"]):
             self.step(argument["step"])
-            readings.append(self.world.read())
-        return self.handed(readings)
-
-    def handed(self, readings: list[array.array[float]]) -> dict[str, Any]:
-        numbers = array.array("d")
-        for rows in (*readings, self.world.log[self.heard :]):
-            numbers.extend(rows)
+            numbers.extend(self.world.read())
+        numbers.extend(self.world.log[self.heard :])
         self.heard = len(self.world.log)
         packed = b64encode(numbers.tobytes()).decode("ascii")
-        return {"readings": len(readings), "thrown": None, "numbers": packed, "seconds": 0.0}
+        readings = argument["times"] + 1
+        return {"readings": readings, "thrown": None, "numbers": packed, "seconds": 0.0}
 
     def contacts(self) -> list[list[float]]:
         return getattr(self.world, "contacts", [])
