@@ -161,7 +161,7 @@ class GuestEngine:
         self.steps += count
         self.rows = None
         if not self.collected:
-            self.inside += self.do("step", request, self.limit)
+            self.inside += self.do("step", request, self.limit) or 0.0
             self.limit = self.patience
         elif single and last.get("held") and last["forces"] == forces:
             last["count"] += 1  # a frame under thrust: one list of forces, not one for each step

@@ -496,7 +496,7 @@ class PythonGuest:
         self.order, folder = order, order["folder"] or ""
         self.name = os.path.join(folder, order["name"])
         self.neighbours = Neighbours(dict(order["imported"]), folder)
-        self.inside = ""
+        self.inside, self.replaced = "", list[str]()
         self.versions = {"python": ".".join(map(str, sys.version_info[:3]))}
         sys.meta_path.insert(0, self.neighbours)
         self.renew()
@@ -530,14 +530,11 @@ class PythonGuest:
         else:
             self.world_of = ExerciseWorld
             self.file = {k: names[f] for k, f in EXERCISE.items() if callable(names.get(f))}
-        models = names["models"] if isinstance(names.get("models"), str) else None
-        self.turns = "rotation" in (models or "").split()
-        self.functions: dict[str, Any] = {
-            **{name: name in self.file for name in (*EXERCISE, *ENGINE)},
-            "replaced": [],
-            "models": models,
-            "advance": self.world_of is ArraysWorld,
-        }
+        models = names.get("models")
+        self.models = models if isinstance(models, str) else None
+        self.turns = "rotation" in (self.models or "").split()
+        self.functions = {name: name in self.file for name in (*EXERCISE, *ENGINE)}
+        self.functions["advance"] = self.world_of is ArraysWorld
 
     def methods_of(self, holder: type) -> dict[str, Any]:
         create = vars(holder)["create"]
@@ -789,8 +786,8 @@ def serve(lines: queue.SimpleQueue[bytes], answers: int) -> None:
                 guest = PythonGuest(order)
             else:
                 guest = sys.modules["v8"].V8Guest(order)
-            hello = {"functions": guest.functions, "versions": guest.versions}
-            tell(answers, {"id": request["id"], **hello})
+            told = ("functions", "models", "replaced", "versions")
+            tell(answers, {"id": request["id"]} | {name: getattr(guest, name) for name in told})
         except Failed as failure:
             tell(answers, {"id": request["id"], "failed": vars(failure)})
             return

@@ -93,8 +93,9 @@ class V8Guest:
             self.eval(f"{self.order['text']}\n//# sourceURL={NAME}")
             bind = BIND_CLASS.format(self.order["holder"]) if self.order["holder"] else BIND
             self.functions = json.loads(str(self.eval(bind)))
+            self.models, self.replaced = map(self.functions.pop, ("models", "replaced"))
             if self.order["engine"]:
-                turns = "rotation" in (self.functions["models"] or "").split()
+                turns = "rotation" in (self.models or "").split()
                 self.v8.eval(f'__host("turns", {json.dumps(turns)})')
             until = monotonic() + self.load_limit
             while not self.v8.eval('__host("ready")'):  # V8 compiles WebAssembly in its own time
