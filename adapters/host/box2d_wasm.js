@@ -4,7 +4,7 @@
 {
   const { wasm } = module.exports;
   const common = {
-    friction: null, turning: true, substeps: 4, hertz: 30, damping_ratio: 10, push_speed: 3, continuous: true, bullet: false,
+    turning: true, substeps: 4, hertz: 30, damping_ratio: 10, push_speed: 3, continuous: true, bullet: false,
   };
   const shipped = { ...common, matched: false, sleeping: true, fast_rotation: false };
   // As box2d_v3:matched, and without a cap on spins: "this should only be used for circular objects, like wheels"
@@ -41,8 +41,7 @@
     Box2D.b2World_EnableContinuous(space, chosen.continuous);
     Box2D.b2World_SetContactTuning(space, chosen.hertz, chosen.damping_ratio, chosen.push_speed * scale);
     Box2D.b2World_SetHitEventThreshold(space, 0);  // every collision is reported
-    const stated = chosen.matched || scene.friction > 0 ? scene.friction : null;
-    const friction = chosen.friction ?? stated, index = new Map();
+    const friction = scene.own_friction, index = new Map();  // null: the engine's own default
 
     function body(position, set) {
       return using(Box2D.b2DefaultBodyDef(), (definition) => {

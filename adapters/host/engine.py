@@ -18,7 +18,7 @@ from crosscheck2d.adapters.advance import Foreseen
 from crosscheck2d.adapters.engine import SILENT, ContactImpulse, NotLoaded, Unsupported
 from crosscheck2d.adapters.engine_row import FLOAT64, EngineRow
 from crosscheck2d.adapters.float32 import must_fit, rounding
-from crosscheck2d.adapters.friction import must_be_frictionless
+from crosscheck2d.adapters.friction import must_be_frictionless, of_shapes
 from crosscheck2d.adapters.host.file import (
     LONGEST,
     SolverFailed,
@@ -217,9 +217,9 @@ class GuestEngine:
 class PackageEngine(GuestEngine):
     """planck, matter or Rapier: `NAME.js` of this folder, which drives an npm package.
 
-    Its file says what the profiles choose; `changed` are keys of that choice; `library` is another
-    version than the pinned one. The driver does the wrap, and its time is in that of `step`.
-
+    Its file says what the profiles choose; `changed` are keys of that choice, or friction;
+    `library` is another version than the pinned one. The driver does the wrap, and its time is in
+    that of `step`.
     """
 
     load_limit = 2 * STEP_LIMIT
@@ -260,7 +260,9 @@ class PackageEngine(GuestEngine):
         self.ahead = deque[Array]()
 
     def message(self, scene: Scene, dt: float) -> dict[str, Any]:
-        return super().message(scene, dt) | {"profile": self.profile, "changed": self.changed}
+        friction = of_shapes(scene, self.profile == "matched", self.changed.get("friction"))
+        chosen = {"profile": self.profile, "changed": self.changed, "own_friction": friction}
+        return super().message(scene, dt) | chosen
 
     def do(self, command: str, argument: Any, limit: float) -> Any:
         try:

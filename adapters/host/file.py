@@ -150,8 +150,8 @@ HINTS = {
     **dict.fromkeys((".html", ".htm"), "; save the text of its script as a .js file"),
     **dict.fromkeys((".mjs", ".cjs"), "; leave out import and export, and name it .js"),
     ".ipynb": "; save its cells as a .py file",
+    **dict.fromkeys((".zip", ".gz", ".tgz", ".tar", ".7z", ".rar", ".xz", ".bz2"), "; unpack it"),
 }
-PACKED = (".zip", ".gz", ".tgz", ".tar", ".7z", ".rar", ".xz", ".bz2")
 
 
 def read_solver(path: Path, within: Path | None = None) -> SolverText:
@@ -164,10 +164,8 @@ def read_solver(path: Path, within: Path | None = None) -> SolverText:
     ending = path.suffix.lower()
     kind = KINDS.get(ending)
     if kind is None:
-        hint = HINTS.get(ending, "; unpack it" if ending in PACKED else "")
-        raise NotASolver(
-            f"{path}: ends in {path.suffix or 'nothing'}; a solver is a .js or a .py file{hint}"
-        )
+        ends = f"ends in {path.suffix or 'nothing'}; a solver is a .js or a .py file"
+        raise NotASolver(f"{path}: {ends}{HINTS.get(ending, '')}")
     data = read_bytes(path, "name an Exercise.js or a solver.py")
     must_be_own(path, within)
     text = decoded(path, data)

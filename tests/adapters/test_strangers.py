@@ -161,7 +161,7 @@ def test_a_file_of_another_kind_says_what_to_do(name: str, hint: str, tmp_path: 
         read_solver(tmp_path / name)
     done = crosscheck("run", "free_fall", "--engine", name, cwd=tmp_path)
     assert (done.returncode, done.stderr.count("\n")) == (2, 1)
-    assert hint in done.stderr or name.endswith(".zip")
+    assert hint in done.stderr
 
 
 def test_check_says_of_a_ported_engine_that_it_is_one(tmp_path: Path):
