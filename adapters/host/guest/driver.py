@@ -361,10 +361,11 @@ def as_functions(module: ModuleType) -> dict[str, Callable[..., Any]]:
 
 class EngineWorld:
     def __init__(self, guest: PythonGuest, scene: dict[str, Any]) -> None:
-        self.guest, self.n, self.walls = guest, scene["n"], len(scene["walls"])
+        self.np, self.guest = import_module("numpy"), guest
+        self.n, self.walls = scene["n"], len(scene["walls"])
         self.dt, self.angle = scene["dt"], list(scene["angle"])
         self.steps, self.log = 0, array.array("d")
-        self.first: list[list[float]] = []  # what was read first
+        self.first: Any = None  # what was read first
         self.renews: bool | None = None  # whether a step returns a new world
         self.hears = scene["listening"] and "collisions" in guest.file
         self.world = self.call("create", Fields(**scene), self.dt)
@@ -397,8 +398,8 @@ class EngineWorld:
             return True
         except Exception:
             now, first = self.rows_of(self.world), self.first
-        still = first and [d[:2] for d in now] == [d[:2] for d in first]
-        if still and any(any(d[2:4]) for d in now):
+        still = first is not None and (now[:, :2] == first[:, :2]).all()
+        if still and now[:, 2:4].any():
             wanted = "it changes its world, or returns a new one that read can read"
             raise wrong("step", result, f"expected is that {wanted}", " and moved no disk")
         return False
@@ -419,45 +420,37 @@ class EngineWorld:
 
     def read(self) -> array.array[float]:
         rows = self.rows_of(self.world)
-        self.first = self.first or rows
-        return array.array("d", [x for disk in rows for x in disk])
+        self.first = rows if self.first is None else self.first
+        return array.array("d", rows.ravel().tolist())
 
-    def rows_of(self, world: Any) -> list[list[float]]:
-        state = self.call("read", world)
-        rows = [self.column(state, name, 2) for name in ("position", "velocity")]
+    def rows_of(self, world: Any) -> Any:
+        state, n = self.call("read", world), self.n
+        columns = [self.column(state, name, (n, 2)) for name in ("position", "velocity")]
         if self.guest.turns:
-            rows += [self.column(state, name, 1) for name in ("angle", "angular_velocity")]
+            columns += [self.column(state, name, (n,)) for name in ("angle", "angular_velocity")]
         else:
-            rows += [[[x] for x in self.angle], [[0.0]] * self.n]
-        return [[x for values in disk for x in values] for disk in zip(*rows)]
+            columns += [self.angle, self.np.zeros(n)]
+        return self.np.column_stack(columns)
 
-    def column(self, state: Any, name: str, width: int) -> list[list[float]]:
-        wanted = f"expected is {'[x, y]' if width == 2 else 'a number'} for each of {self.n} disks"
+    def column(self, state: Any, name: str, shape: tuple[int, ...]) -> Any:
+        each = "[x, y]" if len(shape) == 2 else "a number"
+        wanted = f"expected is {each} for each of {self.n} disks"
         value = state.get(name) if isinstance(state, dict) else getattr(state, name, None)
         if value is None:
             raise wrong("read", state, f"it has no {name}; {wanted}")
-        if hasattr(value, "tolist"):
-            value = value.tolist()
-        if not isinstance(value, (list, tuple)) or len(value) != self.n:
-            if self.guest.loads > 1 and isinstance(value, (list, tuple)) and len(value) > self.n:
-                wanted += "; create keeps disks of the scene before"
-            raise wrong("read", value, wanted, f" as {name}")
-        column = []
+        value = value.tolist() if hasattr(value, "tolist") else value
         try:
-            for i, disk in enumerate(value):
-                disk = disk.tolist() if hasattr(disk, "tolist") else disk
-                numbers = [disk] if width == 1 else disk
-                if not isinstance(numbers, (list, tuple)) or len(numbers) != width:
-                    raise TypeError
-                if any(isinstance(x, (str, bool, complex)) for x in numbers):
-                    raise TypeError
-                column.append([float(x) for x in numbers])
-                if not all(abs(x) < inf for x in column[-1]):
-                    where = f" as {name} of disk {i}"
-                    raise wrong("read", disk, "expected are finite numbers", where, "diverged")
+            numbers = self.np.array(value)
         except (TypeError, ValueError):
             raise wrong("read", value, wanted, f" as {name}") from None
-        return column
+        if numbers.dtype.kind not in "iuf" or numbers.shape != shape:
+            if self.guest.loads > 1 and numbers.ndim and len(numbers) > self.n:
+                wanted += "; create keeps disks of the scene before"
+            raise wrong("read", value, wanted, f" as {name}")
+        if (odd := self.np.argwhere(~self.np.isfinite(numbers))).size:
+            disk, where = numbers[odd[0, 0]].tolist(), f" as {name} of disk {odd[0, 0]}"
+            raise wrong("read", disk, "expected are finite numbers", where, "diverged")
+        return numbers
 
 
 def wrong(function: str, value: Any, wanted: str, what: str = "", kind: str = "error") -> Failed:
