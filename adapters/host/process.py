@@ -342,8 +342,8 @@ Setting = StrictStr | StrictBool | StrictInt | StrictFloat | None
 
 
 class Failure(TypedDict):
-    # unavailable: it imports what is not there, or what a guest may not; waited: ended by the clock,
-    # before it had its processor time
+    # unavailable: it imports what is not there, or what a guest may not; waited: ended by the
+    # clock, before it had its processor time
     kind: Literal[
         "error", "timeout", "memory", "crashed", "refused", "diverged", "unavailable", "waited"
     ]

@@ -195,13 +195,15 @@ Object.defineProperty(globalThis, "__host", { value: (() => {
   // Put functions that write down each call in the place of the file's own; a `const` one stays, and is not seen.
   function watch(calls) {
     const index = (s) => { for (let k = 0; k < spheres.length; k++) if (spheres[k] === s) return k; return -1; };
-    const { integrate, collide, wrap } = file;
     const noted = (called, line) => (...given) => {
       calls[calls.length] = line(given[0], given[1]);
       return apply(called, undefined, given);
     };
-    file.watch(noted(integrate, (s, dt) => `["integrate",${index(s)},${text(dt)}]`),
-      noted(collide, (a, b) => `["collide",${index(a)},${index(b)}]`), noted(wrap, () => '["wrap"]'));
+    file.watch({
+      integrate: noted(file.integrate, (s, dt) => `["integrate",${index(s)},${text(dt)}]`),
+      collide: noted(file.collide, (a, b) => `["collide",${index(a)},${index(b)}]`),
+      wrap: noted(file.wrap, () => '["wrap"]'),
+    });
   }
 
   function call(what, on) {

@@ -31,15 +31,13 @@ VERBS = ", ".join(
     f'{verb}: typeof {name} === "undefined" ? null : {name}'
     for verb, name in [*EXERCISE.items(), *zip(ENGINE, ENGINE)]
 )
-BIND = f"""__host("bind", {{ {VERBS},
-  ufo: () => ufo, asteroids: () => asteroids,
-  watch: (i, c, w) => {{
-    try {{ if (typeof integrate === "function") integrate = i; }} catch (_) {{}}
-    try {{
-      if (typeof sphereSphereCollisionHandling === "function") sphereSphereCollisionHandling = c;
-    }} catch (_) {{}}
-    try {{ if (typeof projectObjects === "function") projectObjects = w; }} catch (_) {{}}
-  }},
+WATCH = " ".join(
+    f'try {{ if (typeof {name} === "function") {name} = by.{verb}; }} catch (_) {{}}'
+    for verb, name in EXERCISE.items()
+    if verb in ("integrate", "collide", "wrap")
+)
+BIND = f"""__host("bind", {{
+  {VERBS}, ufo: () => ufo, asteroids: () => asteroids, watch: (by) => {{ {WATCH} }},
 }})"""
 # A class has the functions of an engine, of itself or of its instances.
 BIND_CLASS = """__host("bind", ((engine) => {{
