@@ -86,9 +86,8 @@ def box_of(walls: Array) -> list[list[float]] | None:
     low, high = walls.min(axis=(0, 1)).tolist(), walls.max(axis=(0, 1)).tolist()
     corners = [low, [high[0], low[1]], high, [low[0], high[1]]]
     sides = {frozenset(map(tuple, side)) for side in zip(corners, corners[1:] + corners[:1])}
-    return (
-        [low, high] if {frozenset(map(tuple, wall)) for wall in walls.tolist()} == sides else None
-    )
+    made = {frozenset(map(tuple, wall)) for wall in walls.tolist()}
+    return [low, high] if made == sides else None
 
 
 class GuestEngine:
@@ -127,7 +126,7 @@ class GuestEngine:
         return self.started
 
     def learn(self, process: SolverProcess) -> None:
-        """What has to be known of the file before a scene."""
+        pass
 
     def load(self, scene: Scene, dt: float) -> None:
         assert self.process  # it is started, and known
@@ -298,15 +297,12 @@ class PackageEngine(GuestEngine):
         self.expected = (count, times - 1)
         self.rows = self.ahead.popleft()
 
-    def read(self) -> State:
-        state, scene = super().read(), self.scene
-        still = scene.static
-        return State(
-            np.where(still[:, None], scene.position, state.position),
-            np.where(still[:, None], 0.0, state.velocity),
-            np.where(still, scene.angle, state.angle),
-            np.where(still, scene.angular_velocity, state.angular_velocity),
-        )
+    def readings(self, answer: dict[str, Any]) -> Array:
+        rows, scene = super().readings(answer).copy(), self.scene
+        turning = (scene.angle, scene.angular_velocity)
+        start = np.column_stack([scene.position, np.zeros((scene.n, 2)), *turning])
+        rows[:, scene.static] = start[scene.static]
+        return rows
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
         rows = super().settings()

@@ -92,8 +92,6 @@ class SolverText:
     """A guest's file as read, with all that is needed to play it on any machine.
 
     Attributes:
-        path: where it was.
-        kind: "javascript" or "python".
         text: with \\n at the end of lines.
         digest: 16 hex digits of SHA-256 over the file's bytes, as sha256sum gives them.
         imported: the modules that it imports from its own folder, or the gl-matrix that it calls:

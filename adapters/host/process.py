@@ -91,22 +91,16 @@ def end(process: subprocess.Popen[bytes]) -> None:
 
 
 class SolverProcess:
-    """A guest in a separate process; use it in a `with`, or close it.
+    """A guest in a separate process; use it in a `with`, or close it. Raises `SolverFailed` if the
+    file cannot be loaded, `NotStarted` if the process cannot be started.
 
     compiled: numba compiles, and keeps what it has compiled.
 
     Attributes:
         functions: name of a verb of the driver -> whether the file has it; models; the built-ins
             that it replaced.
-        kind: "javascript" or "python".
         surface: "exercise" (functions on spheres), "advance" (arrays, as in reference_impl) or
             "engine" (create, step, read).
-        versions: library -> version.
-        level: what protects the machine from it.
-
-    Raises:
-        SolverFailed: the file cannot be loaded.
-        NotStarted: the process cannot be started.
     """
 
     process: subprocess.Popen[bytes] | None
