@@ -315,23 +315,22 @@ def protection() -> Level:
 
 # ---- the forms of what a guest answers ----------------------------------------------------------
 
-Number = Annotated[
-    float, Field(strict=True)
-]  # no bool, no text, no int that is longer than a float
+# no bool, no text, no int that is longer than a float
+Number = Annotated[float, Field(strict=True)]
 Count = Annotated[int, Field(strict=True, ge=0, lt=2**31)]
 Place = Annotated[int, Field(strict=True, ge=-1, lt=2**31)]  # of a sphere; -1 for another
 Sphere = Annotated[list[Number], Field(min_length=12, max_length=12)]
 Contact = Annotated[list[Number], Field(min_length=19, max_length=19)]
 
 
-def must_begin_with_its_name(call: list[Any]) -> list[Any]:
-    if not call or type(call[0]) is not str:
-        raise ValueError("a call begins with the name of its function")
+def must_be_a_call(call: list[Any]) -> list[Any]:
+    if [k for k, item in enumerate(call) if type(item) is str] != [0]:
+        raise ValueError("a call is the name of its function, then numbers")
     return call
 
 
 Verb = Literal["integrate", "collide", "wrap", "step"]
-Call = Annotated[list[Verb | Place | Number], AfterValidator(must_begin_with_its_name)]
+Call = Annotated[list[Verb | Place | Number], AfterValidator(must_be_a_call)]
 Setting = StrictStr | StrictBool | StrictInt | StrictFloat | None
 
 
