@@ -317,6 +317,16 @@ def test_a_disk_of_box2d_wasm_spins_fast_where_fast_rotation_is_allowed(allowed,
 
 
 @fetched
+@pytest.mark.parametrize("scene", ["oblique_e09", "friction_bounce_e1_mu05", "ship_thrust"])
+def test_box2d_wasm_as_shipped_moves_disks_as_pyb2d3_does_to_the_bit(scene):
+    one = scenario(scene)
+    rows = ENGINES["box2d_v3:shipped"], NAMED["box2d_wasm:shipped"]
+    first, second = (play_once(row.make, "x:shipped", one, one.dt(4)).trajectory for row in rows)
+    assert first.position.tobytes() == second.position.tobytes()
+    assert first.velocity.tobytes() == second.velocity.tobytes()
+
+
+@fetched
 def test_an_engine_that_never_comes_back_is_a_time_out(monkeypatch):
     monkeypatch.setattr("crosscheck2d.adapters.host.engine.STEP_LIMIT", 0.025)
     waiting.clear()
