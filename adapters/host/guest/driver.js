@@ -173,14 +173,10 @@ Object.defineProperty(globalThis, "__host", { value: (() => {
   }
 
   function strange(all) {
-    const names = empty();
+    const names = empty(), known = setPrototypeOf(sphere(empty()), null);
     for (let i = 0; i < all.length; i++) {
       const own = keys(all[i]);
-      for (let k = 0; k < own.length; k++) {
-        let known = false;
-        for (let f = 0; f < FIELDS.length; f++) known = known || FIELDS[f] === own[k];
-        if (!known) names[names.length] = own[k];
-      }
+      for (let k = 0; k < own.length; k++) if (!(own[k] in known)) names[names.length] = own[k];
     }
     return names;
   }
