@@ -35,6 +35,7 @@ Object.defineProperty(globalThis, "__host", { value: (() => {
   let world, steps, log, numbers;  // the world being played, its steps, its new collisions; what is handed back
   let accesses = "";  // what the last traced call read and wrote
   let spheres = empty();  // of the last question, which a call that failed may have changed
+  let answers = empty();  // to the last questions that were put together
 
   // What a package for browsers asks for.
   const quiet = () => undefined;
@@ -237,6 +238,13 @@ Object.defineProperty(globalThis, "__host", { value: (() => {
     const strayed = !question.world && witness() !== known;
     return `{"states":${joined(states)},"returned":${returned},"strayed":${strayed},"strange":${list(strange(spheres), word, 9)},`
       + `"kept":${list(differences(before, globals()), word, 9)},"calls":${joined(calls)},"error":${problem}}`;
+  }
+
+  // Questions, one after the other. What comes before a call that never comes back can still be had of `answers`.
+  function several(questions) {
+    answers = empty();
+    for (let k = 0; k < questions.length; k++) answers[k] = answer("ask", questions[k]);
+    return joined(answers);
   }
 
   // A sphere that writes down who reads or writes which of its numbers, and from where in the file.
@@ -591,9 +599,14 @@ Object.defineProperty(globalThis, "__host", { value: (() => {
   }
 
   const commands = {
-    ask, left: () => rows(spheres), trace, accesses: traceOf, load, step, play, ahead,
+    ask, several, answers: () => joined(answers), left: () => rows(spheres), trace, accesses: traceOf, load, step, play, ahead,
     samples, contacts: () => world.contacts(), begin: () => { file.begin(); return "null"; }, globals: () => witness() || "null",
   };
+
+  function answer(name, argument) {
+    try { return `{"done":${commands[name](argument)}}`; }
+    catch (error) { return `{"failed":${reportOf(error)}}`; }
+  }
 
   return (name, argument) => {
     if (name === "confine") return confine();
@@ -602,7 +615,6 @@ Object.defineProperty(globalThis, "__host", { value: (() => {
     if (name === "inside") return inside;
     if (name === "numbers") return numbers;
     if (name === "ready") return typeof file.ready !== "function" || !!file.ready();
-    try { return `{"done":${commands[name](argument === undefined ? undefined : parse(argument))}}`; }
-    catch (error) { return `{"failed":${reportOf(error)}}`; }
+    return answer(name, argument === undefined ? undefined : parse(argument));
   };
 })() });

@@ -33,6 +33,7 @@ from importlib import import_module
 from importlib.abc import Loader
 from importlib.machinery import ModuleSpec, PathFinder
 from importlib.util import module_from_spec, spec_from_file_location
+from itertools import takewhile
 from json import dumps, loads  # before a guest can replace them
 from math import inf, isinf, nan
 from operator import index
@@ -43,6 +44,7 @@ from typing import Any
 
 PATIENCE = 3  # times its limit of processor time that a call may take by the clock
 LOAD_LIMIT = 3.0  # s; importing numba takes one
+TOGETHER = 0.2  # of a question's time: all together take milliseconds, or one is asked again
 MOST = 400  # contacts and accesses kept for the check
 SHOWN = 60  # characters of a returned value in a message
 LONGEST = 400  # characters of a message
@@ -854,7 +856,17 @@ def reply(guest: Any, requests: list[Any]) -> list[dict[str, Any]]:
     """
     answers: list[dict[str, Any]] = []
     endless: dict[str, dict[str, Any]] = {}
-    for command, argument, seconds in requests:
+    alone = -1  # the question that stopped those after it
+    while len(answers) < len(requests):
+        k = len(answers)
+        command, argument, seconds = requests[k]
+        if k != alone and not endless and hasattr(guest, "together"):
+            alike = list(takewhile(["ask", seconds].__eq__, (one[::2] for one in requests[k:])))
+            if len(alike) > 1:
+                questions = [question for _, question, _ in requests[k : k + len(alike)]]
+                answers += guest.together(questions, seconds * TOGETHER)
+                alone = len(answers)
+                continue
         calls = [call[0] for call in argument["calls"]] if command == "ask" else []
         known = next((endless[call] for call in calls if call in endless), None)
         try:

@@ -7,6 +7,7 @@ import json
 import os
 import re
 from base64 import b64encode
+from collections.abc import Sequence
 from contextlib import suppress
 from time import monotonic, perf_counter, process_time, sleep
 from typing import Any
@@ -126,20 +127,24 @@ class V8Guest:
             failure.what = f"{inside} {failure.what}".strip()
             raise failure from None
         seconds = perf_counter() - began
+        result = self.read(command, answer)
+        if command == "step":
+            return seconds
+        if isinstance(result, dict) and "readings" in result:
+            numbers = self.v8.eval('__host("numbers")')
+            assert isinstance(numbers, memoryview)
+            result |= {"numbers": b64encode(numbers).decode("ascii"), "seconds": seconds}
+        return result
+
+    def read(self, command: str, answer: dict[str, Any]) -> Any:
         if "failed" in answer:
             raise self.thrown(answer["failed"])
         done = answer["done"]
-        if command == "step":
-            return seconds
         if command == "accesses":
             return [[*each, [int(k) for k, _ in PLACE.findall(stack)]] for *each, stack in done]
         for part in ("error", "thrown"):
             if isinstance(done, dict) and done.get(part):
                 done[part] = vars(self.thrown(done[part]))
-        if isinstance(done, dict) and "readings" in done:
-            numbers = self.v8.eval('__host("numbers")')
-            assert isinstance(numbers, memoryview)
-            done |= {"numbers": b64encode(numbers).decode("ascii"), "seconds": seconds}
         return done
 
     def thrown(self, error: dict[str, str]) -> Failed:
@@ -149,6 +154,27 @@ class V8Guest:
         place = PLACE.search(error["stack"])
         line, column = (int(place[1]), int(place[2])) if place else (0, 0)
         return Failed(error["kind"], what, line, column)
+
+    def together(self, questions: Sequence[Any], limit: float) -> list[dict[str, Any]]:
+        """The answers to the first questions, or to all, in a single call of V8, because a call
+        takes longer than a question. Fewer if they take `limit` s or too much memory."""
+        answers: list[Any] = []
+        with suppress(JSEvalException):
+            try:
+                put = json.dumps(json.dumps(questions))
+                answers = self.done(f'__host("several", {put})', limit)
+            except JSEvalException:
+                answers = self.done('__host("answers")', limit)
+        replies: list[dict[str, Any]] = []
+        for answer in answers:
+            try:
+                replies.append({"done": self.read("ask", answer)})
+            except Failed as failure:
+                replies.append({"failed": vars(failure)})
+        return replies
+
+    def done(self, code: str, limit: float) -> Any:
+        return json.loads(str(self.v8.eval(code, timeout_sec=limit)))["done"]
 
     def evaluate(self, code: str, limit: float, may_repeat: bool) -> object:
         """The result of `code` in V8. If it was stopped before it had the processor for half of
