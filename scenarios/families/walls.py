@@ -13,7 +13,7 @@ from crosscheck2d.scenarios.model import Array, Scenario, Trajectory
 from crosscheck2d.scenarios.truth.closed_forms import (
     answer,
     at_rest,
-    bouncing,
+    drop,
     flight,
     offset_growth,
     stacked,
@@ -25,21 +25,12 @@ EPS = float(np.finfo(float).eps)
 ON_FLOOR: dict[str, Any] = {"walls": FLOOR, "gravity": [0.0, -G]}
 
 
-def _ball(name: str, asks: str, height: float, restitution: float, least: float = 0.0) -> Scenario:
-    """A ball dropped from `height` m over the floor; bounces that last less than `least` s are not
-    listed."""
-    radius, mass = 0.25, 1.0
-    scene = lay_out([[0.0, radius + height]], restitution=restitution, **ON_FLOOR)
-
-    def truth(t: Array) -> Trajectory:
-        legs = bouncing(height, G, restitution, t[-1])
-        gap, speed = legs.at(t)
-        lasting = int((np.diff(legs.start)[1:] > least).sum())
-        collisions = legs.wall_collisions(0, (0,), mass, restitution)[:lasting]
-        position, velocity = (np.stack([0 * y, y], axis=-1)[:, None] for y in (gap + radius, speed))
-        return answer(scene, t, (position, velocity), collisions)
-
+def ball(
+    name: str, asks: str, height: float, restitution: float, shortest: float | None = None
+) -> Scenario:
+    scene = lay_out([[0.0, 0.25 + height]], restitution=restitution, **ON_FLOOR)
     source = "the bouncing ball in closed form, to rest and after"
+    truth = partial(drop, scene, height, shortest=shortest)
     return Scenario(name, asks, source, scene, duration=10.0, truth=truth)
 
 
@@ -181,20 +172,20 @@ def resting(name: str, asks: str, source: str, y: Array) -> Scenario:
 
 
 WALLS = (
-    _ball(
+    ball(
         "bouncing_ball_e1",
         "Does a ball dropped at e = 1 come back to its height every time?",
         height=1.54,
         restitution=1.0,
     ),
     # It bounces infinitely often, until it rests at 9 s.
-    _ball(
+    ball(
         "bouncing_ball_e09",
         "Does a ball dropped at e = 0.9 lose height as it should, and come to rest at the right"
         " time?",
         height=1.11,
         restitution=0.9,
-        least=1e-4,
+        shortest=1e-4,
     ),
     wall_to_wall(),
     box_billiard(),

@@ -135,6 +135,20 @@ def bouncing(height: float, gravity: float, restitution: float, until: float) ->
     )
 
 
+def drop(scene: Scene, height: float, t: Array, shortest: float | None = None) -> Trajectory:
+    """A disk dropped from rest `height` m above its floor; bounces that last less than `shortest` s
+    are not listed."""
+    legs = bouncing(height, -scene.gravity[1], scene.restitution, t[-1])
+    gap, speed = legs.at(t)
+    collisions = legs.wall_collisions(0, (0,), scene.mass[0], scene.restitution)
+    if shortest is not None:
+        collisions = collisions[: int((np.diff(legs.start)[1:] > shortest).sum())]
+    position, velocity = (
+        np.stack([0 * y, y], axis=-1)[:, None] for y in (gap + scene.radius[0], speed)
+    )
+    return answer(scene, t, (position, velocity), collisions)
+
+
 def to_and_fro(
     place: float, velocity: float, length: float, restitution: float, until: float
 ) -> Legs:
