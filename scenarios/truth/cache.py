@@ -39,9 +39,8 @@ def folder() -> Path | None:
     return user_cache_path("crosscheck2d", appauthor=False)
 
 
-def key_of(scenario: Scenario, certifying: bool) -> str:
-    """A hash of everything a record depends on: scene, thrusts, duration, the oracle's source, and
-    whether it works with intervals (`certifying`)."""
+def key_of(scenario: Scenario) -> str:
+    """A hash of everything a record depends on: scene, thrusts, duration, the oracle's source."""
     scene, hashed = scenario.scene, hashlib.sha256()
     parts = [
         scene.position,
@@ -59,7 +58,7 @@ def key_of(scenario: Scenario, certifying: bool) -> str:
     if scene.friction or any(p.frame == "body" for p in scenario.thrusts):
         torques = [p.torque for p in scenario.thrusts]
         parts += [scene.friction, scene.inertia, scene.angle, scene.angular_velocity, torques]
-    hashed.update(f"{source_hash()} {certifying} {[np.shape(part) for part in parts]}".encode())
+    hashed.update(f"{source_hash()} {[np.shape(part) for part in parts]}".encode())
     for part in parts:
         hashed.update(np.ascontiguousarray(part, dtype="<f8").tobytes())
     return hashed.hexdigest()[:32]

@@ -14,7 +14,7 @@ from crosscheck2d.scenarios.no_truth import NoTruth
 from crosscheck2d.scenarios.truth.cache import keep, key_of, look_up
 from crosscheck2d.scenarios.truth.oracle.bodies import Leg
 from crosscheck2d.scenarios.truth.oracle.events import trace, turns_with_disk
-from crosscheck2d.scenarios.truth.oracle.numbers import Numbers, Undecided, balls, digits, has_balls
+from crosscheck2d.scenarios.truth.oracle.numbers import Numbers, Undecided, balls, mpfr
 from crosscheck2d.scenarios.truth.oracle.path import Path, TimeLimit, WorkLimit
 from crosscheck2d.scenarios.truth.oracle.resting import FOR_SERIES
 from crosscheck2d.scenarios.truth.record import (
@@ -74,7 +74,7 @@ class OracleTruth:
         `NoTruth`."""
         if self.known is not None:
             return self.known
-        key = key_of(self.scenario, has_balls())
+        key = key_of(self.scenario)
         found = look_up(key)
         if found is None:
             clock = clock or TimeLimit()
@@ -97,8 +97,8 @@ def with_oracle(scenario: Scenario) -> Scenario:
 def computed(
     scenario: Scenario, kind: Callable[[int], Numbers] | None = None, clock: TimeLimit | None = None
 ) -> TruthRecord:
-    """The record of a scenario: proven by interval arithmetic where that is installed and decides
-    every comparison, else computed at two precisions that agree.
+    """The record of a scenario: proven by interval arithmetic where that decides every comparison,
+    else computed at two precisions that agree.
 
     kind: the numbers for two precisions; if given, no interval arithmetic.
     clock: when its time runs out, the record ends where the computation is then.
@@ -117,8 +117,8 @@ def computed(
     turning = scene.friction or turns_with_disk(thrusts)
     forced = [p for p in thrusts if p.force.any() or (turning and p.torque)]
     clock = clock or TimeLimit()
-    record = certified(scenario, forced, clock) if kind is None and has_balls() else None
-    return record or two_precisions(scenario, forced, kind or digits, clock)
+    record = certified(scenario, forced, clock) if kind is None else None
+    return record or two_precisions(scenario, forced, kind or mpfr, clock)
 
 
 def certified(scenario: Scenario, forced: Sequence[Thrust], clock: TimeLimit) -> TruthRecord | None:

@@ -17,7 +17,7 @@ from crosscheck2d.scenarios.truth import horizon as of_horizon
 from crosscheck2d.scenarios.truth.exact import computed
 from crosscheck2d.scenarios.truth.horizon import DIVERGED, EPS, TangentVectors, roundings
 from crosscheck2d.scenarios.truth.oracle.events import trace
-from crosscheck2d.scenarios.truth.oracle.numbers import digits
+from crosscheck2d.scenarios.truth.oracle.numbers import mpfr
 from crosscheck2d.scenarios.truth.oracle.path import Path
 from crosscheck2d.scenarios.truth.order import float64_horizon
 from crosscheck2d.scenarios.truth.record import record_of
@@ -29,7 +29,7 @@ than the first."""
 
 
 def path_of(one: Scenario) -> Path:
-    return trace(one.scene, [p for p in one.thrusts if p.force.any()], one.duration, digits(300))
+    return trace(one.scene, [p for p in one.thrusts if p.force.any()], one.duration, mpfr(300))
 
 
 def asked(scene: Scene, duration: float, thrusts: tuple[Thrust, ...] = ()) -> Scenario:

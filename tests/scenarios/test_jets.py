@@ -12,7 +12,7 @@ from crosscheck2d.scenarios.catalogue import scenario
 from crosscheck2d.scenarios.families.placing import lay_out
 from crosscheck2d.scenarios.model import Scene, Thrust
 from crosscheck2d.scenarios.truth.exact import computed
-from crosscheck2d.scenarios.truth.oracle.numbers import decimals, mpfr
+from crosscheck2d.scenarios.truth.oracle.numbers import mpfr
 from tests.scenarios.test_oracle import asked, states
 
 ALONE = Scene(
@@ -52,7 +52,7 @@ def quadrature(scene: Scene, thrusts: list[Thrust], until: float) -> np.ndarray:
     return np.array([*x, *v, angle, spin])
 
 
-@pytest.mark.parametrize("kind", [None, mpfr, decimals])
+@pytest.mark.parametrize("kind", [None, mpfr])
 def test_a_free_disk_is_followed_under_thrusts_and_torques(kind):
     thrusts = [
         Thrust(0, 0.0, 1.0, [3.0, -1.0], frame="body"),
