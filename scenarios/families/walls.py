@@ -201,7 +201,7 @@ WALLS = (
         "column_of_ten",
         "Does a column of ten disks carry its weight, or does it sink, jitter or fall?",
         "equilibrium, unstable, exact while all centres have the same x",
-        0.25 + 2 * 0.25 * np.arange(10),
+        0.25 + 2 * 0.25 * np.arange(10.0),
     ),
     with_oracle(
         Scenario(
