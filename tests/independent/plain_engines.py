@@ -284,28 +284,24 @@ def played_box2d_v3(
 
 
 PLAIN = {"pymunk": play_pymunk, "box2d": play_box2d, "box2d_v3": play_box2d_v3}
-KNOWN = {
-    "elasticity",
-    "iterations",
-    "collision_slop",
-    "collision_bias",
-    "collision_persistence",
-    "damping",
-    "unit of length in m",
-    "unit of time in s",
-    "wall skin in m",
-    "velocity, position iterations",
-    "friction",
-    "restitution",
-    "sleeping",
-    "continuous collision",
-    "continuous collision between disks",
-    "sub-stepping",
-    "warm starting",
-    "length unit in m",
-    "restitution threshold in m/s",
-    "speed cap in m/s",
-    "substeps",
-    "contact tuning (hertz, damping ratio, push speed in m/s)",
-}
-"""The settings that are asked for here; what an adapter asks for beside them would go unnoticed."""
+
+
+class Settings(dict[str, Any]):
+    """Notes which of its keys are `read`: what an adapter asks for beside them would go unnoticed
+    here."""
+
+    def __init__(self, asked: dict[str, Any]) -> None:
+        super().__init__(asked)
+        self.read = set[str]()
+
+    def __contains__(self, name: object) -> bool:
+        self.read.add(str(name))
+        return super().__contains__(name)
+
+    def __getitem__(self, name: str) -> Any:
+        self.read.add(name)
+        return super().__getitem__(name)
+
+    def get(self, name: str, default: Any = None) -> Any:
+        self.read.add(name)
+        return super().get(name, default)

@@ -132,13 +132,6 @@ def test_same_seed_same_scene_and_another_seed_another(name):
     assert (one.seed, other.seed) == (3, 4)
 
 
-def test_other_scenarios_do_not_depend_on_the_seed():
-    for name in set(SCENARIOS) - set(RANDOM):
-        one, other = scenario(name, 3), scenario(name, 4)
-        assert one.seed is None
-        assert one.scene.position.tobytes() == other.scene.position.tobytes()
-
-
 def test_asteroids_are_drawn_as_the_exercise_says():
     scene = scenario("asteroids", 7).scene
     size, speed = scene.radius[1:], np.abs(scene.velocity[1:])

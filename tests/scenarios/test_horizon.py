@@ -21,7 +21,7 @@ from crosscheck2d.scenarios.truth.oracle.numbers import mpfr
 from crosscheck2d.scenarios.truth.oracle.path import Path
 from crosscheck2d.scenarios.truth.order import float64_horizon
 from crosscheck2d.scenarios.truth.record import record_of
-from tests.scenarios.exercise_box import boxed, lasting
+from tests.scenarios.exercise_box import boxed
 
 NEAR = 1e-7
 """m, m/s: how far starts are moved to measure a derivative; the second order is as much smaller
@@ -255,27 +255,6 @@ def test_motions_that_are_not_chaotic_are_followed_to_their_end():
     ):
         one = scenario(name)
         assert float64_horizon(one, path := path_of(one)) == (np.inf, path)
-
-
-def test_the_horizon_does_not_depend_on_the_units_of_length_and_time():
-    # powers of two, so that nothing is rounded otherwise
-    one = lasting(boxed(1), 12.0)
-    until = computed(one).float64_horizon
-    scene = one.scene
-    wide = replace(
-        scene,
-        position=scene.position * 1024,
-        velocity=scene.velocity * 1024,
-        radius=scene.radius * 1024,
-        inertia=scene.inertia * 1024**2,
-        walls=scene.walls * 1024,
-    )
-    fast = replace(scene, velocity=scene.velocity * 8)
-
-    assert until < 12.0
-    assert computed(replace(one, scene=wide)).float64_horizon == pytest.approx(until, rel=1e-9)
-    quick = replace(one, scene=fast, duration=1.5, sample_interval=1.5 / 100)
-    assert computed(quick).float64_horizon == pytest.approx(until / 8, rel=1e-9)
 
 
 def test_the_horizon_is_shorter_beside_a_disk_far_away_that_nothing_meets():

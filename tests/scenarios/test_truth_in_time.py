@@ -17,6 +17,7 @@ from crosscheck2d.reports.run.comparing import compute_record, record_of
 from crosscheck2d.reports.run.pool import run_all
 from crosscheck2d.scenarios.catalogue import scenario
 from crosscheck2d.scenarios.families.placing import box, lay_out
+from crosscheck2d.scenarios.files.scene_file import scene_text
 from crosscheck2d.scenarios.model import Scenario
 from crosscheck2d.scenarios.no_truth import NoTruth
 from crosscheck2d.scenarios.truth import cache as truth_cache
@@ -31,22 +32,7 @@ from tests.reports.terminal.command_line import crosscheck
 
 REASON, CUT = "the limit of 5 s was reached", 20.0
 KINDS = [None, mpfr]
-LONG = """\
-name = "long"
-duration = 1000000
-sample_interval = 1
-substeps = [1]
-restitution = 1.0
-gravity = [0.0, 0.0]
-[box]
-low = [-0.5, -0.5]
-high = [0.5, 0.5]
-[[disk]]
-position = [0, 0]
-velocity = [-2.1938145353255925, 2.084602421623396]
-radius = 0.3
-mass = 1.0
-"""
+LONG = lay_out([[0, 0]], [-2.19, 2.08], radius=0.3, walls=box([-0.5] * 2, [0.5] * 2))
 
 
 def boxed(speed: float = 1.1) -> Scenario:
@@ -177,7 +163,8 @@ def test_an_endless_scene_is_answered_up_to_the_limit_of_time(
     monkeypatch.setattr(truth, "compute_record", by_processor_time)
     # on a busy machine 6 s of work take longer than 6 s
     monkeypatch.setattr(truth, "run_all", lambda tasks, workers, _: run_all(tasks, workers, 300.0))
-    (tmp_path / "long.toml").write_text(LONG)
+    long = Scenario("long", "?", "", LONG, 1e6, 1.0, (1,))
+    (tmp_path / "long.toml").write_text(scene_text(long))
     done = crosscheck("truth", "long.toml", "--timeout", "6", "--json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     said = json.loads(done.stdout)
