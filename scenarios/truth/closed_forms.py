@@ -40,19 +40,9 @@ def answer(
     """
     angle, angular_velocity = turning or flight(t[:, None], scene.angle, scene.angular_velocity)
     kept = t <= horizon
-    return Trajectory(
-        t=frozen(t[kept]),
-        position=frozen(motion[0][kept]),
-        velocity=frozen(motion[1][kept]),
-        angle=frozen(angle[kept]),
-        angular_velocity=frozen(angular_velocity[kept]),
-        collisions=Collisions.of(
-            [collision for collision in collisions if kept.any() and collision[0] <= t[kept][-1]]
-        ),
-        horizon=horizon,
-        error_bound=error_bound,
-        reason=reason,
-    )
+    states = (frozen(part[kept]) for part in (t, *motion, angle, angular_velocity))
+    known = [collision for collision in collisions if kept.any() and collision[0] <= t[kept][-1]]
+    return Trajectory(*states, Collisions.of(known), horizon, error_bound, reason)
 
 
 def at_rest(scene: Scene, t: Array, collisions: Iterable[Collision] = ()) -> Trajectory:
@@ -161,10 +151,9 @@ def to_and_fro(
     k = np.arange(1.0, int(until * speed / length) + 3)
     first = (length - place if up else place) / speed
     at_top = (k % 2 == 1) == up
+    lasts = length / (speed * restitution) * geometric(1 / restitution, k - 1)
     return Legs(
-        start=np.array(
-            [0, *first + length / (speed * restitution) * geometric(1 / restitution, k - 1)]
-        ),
+        start=np.array([0, *first + lasts]),
         position=np.array([place, *np.where(at_top, length, 0.0)]),
         velocity=np.array([velocity, *np.where(at_top, -1, 1) * speed * restitution**k]),
         acceleration=np.zeros(len(k) + 1),
@@ -223,10 +212,8 @@ def world_thrusts(scene: Scene, thrusts: Sequence[Thrust], t: Array) -> Trajecto
     for thrust in thrusts:
         acted = np.clip(t - thrust.start, 0, thrust.stop - thrust.start)
         moved = acted * (acted / 2 + np.maximum(t - thrust.stop, 0))
-        acceleration, spin_up = (
-            thrust.force / scene.mass[thrust.disk],
-            thrust.torque / scene.inertia[thrust.disk],
-        )
+        acceleration = thrust.force / scene.mass[thrust.disk]
+        spin_up = thrust.torque / scene.inertia[thrust.disk]
         velocity[:, thrust.disk] += acted[:, None] * acceleration
         position[:, thrust.disk] += moved[:, None] * acceleration
         angular_velocity[:, thrust.disk] += acted * spin_up
