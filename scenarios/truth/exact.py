@@ -132,9 +132,8 @@ def certified(scenario: Scenario, forced: Sequence[Thrust], clock: TimeLimit) ->
     attempts: list[tuple[Path, int]] = []
     while bits <= MOST_BITS:
         try:
-            path = trace(
-                scenario.scene, forced, until, balls(bits), WorkLimit(allowed_steps(bits), clock)
-            )
+            work = WorkLimit(allowed_steps(bits), clock)
+            path = trace(scenario.scene, forced, until, balls(bits), work)
             error, reached = widest(widths(path), min(path.end, until)), until
             if error < accuracy and not clock.expired:
                 return record_of(scenario, path, error, bits, CERTIFIED)
@@ -186,14 +185,9 @@ def widths(path: Path) -> Array:
         angle, spin = leg.turn[:2] if leg.turn else (leg.x, leg.vx)
         places, rates = (leg.x, leg.y, angle), (leg.vx, leg.vy, spin)
         late, speed = float(leg.t.rad()), max(float(abs(rate)) for rate in rates)
-        rows.append(
-            (
-                float(leg.t),
-                max(float(place.rad()) for place in places) + late * speed,
-                max(float(rate.rad()) for rate in rates)
-                + sum(float(x.rad()) for x in leg.hop or ()),
-            )
-        )
+        width = max(float(place.rad()) for place in places) + late * speed
+        hop = sum(float(x.rad()) for x in leg.hop or ())
+        rows.append((float(leg.t), width, max(float(rate.rad()) for rate in rates) + hop))
     return np.array(rows)
 
 
@@ -208,12 +202,10 @@ def two_precisions(
     scene, until, bits = scenario.scene, scenario.duration, FEWEST_BITS
     attempts: list[tuple[Path, float, int]] = []
     while True:
-        coarse = trace(
-            scene, forced, until, kind(bits), WorkLimit(allowed_steps(bits), clock, COARSE)
-        )
-        fine = trace(
-            scene, forced, until, kind(2 * bits), WorkLimit(allowed_steps(2 * bits), clock)
-        )
+        work = WorkLimit(allowed_steps(bits), clock, COARSE)
+        coarse = trace(scene, forced, until, kind(bits), work)
+        work = WorkLimit(allowed_steps(2 * bits), clock)
+        fine = trace(scene, forced, until, kind(2 * bits), work)
         diverged, error = difference(coarse, fine, until, kind(2 * bits), accuracy_of(scenario))
         end = min(coarse.end, fine.end, until)
         if clock.expired and coarse.end < fine.end:
@@ -283,9 +275,8 @@ def difference(
     with k.precise():
         for mine, theirs in zip(coarse.legs, fine.legs):
             for leg in mine[len(theirs) :] + theirs[len(mine) :]:
-                diverged = (
-                    min(diverged, float(leg.t)) if float(leg.t) < end - ACCURACY else diverged
-                )
+                if float(leg.t) < end - ACCURACY:
+                    diverged = min(diverged, float(leg.t))
             for one, other in zip(mine, theirs):
                 t = min(float(one.t), float(other.t))
                 if t < end and (error := _apart(one, other, end - t)) > accuracy:
