@@ -38,11 +38,11 @@ def answer(
     rad/s; default: every disk keeps its spin. collisions: those after the last sample are dropped.
     reason: why the answer ends at the horizon.
     """
-    angle, angular_velocity = turning or flight(t[:, None], scene.angle, scene.angular_velocity)
+    angle, spin = turning or flight(t[:, None], scene.angle, scene.angular_velocity)
     kept = t <= horizon
-    states = (frozen(part[kept]) for part in (t, *motion, angle, angular_velocity))
-    known = [collision for collision in collisions if kept.any() and collision[0] <= t[kept][-1]]
-    return Trajectory(*states, Collisions.of(known), horizon, error_bound, reason)
+    t, x, v, angle, spin = (frozen(part[kept]) for part in (t, *motion, angle, spin))
+    known = Collisions.of([row for row in collisions if len(t) and row[0] <= t[-1]])
+    return Trajectory(t, x, v, angle, spin, known, horizon, error_bound, reason)
 
 
 def at_rest(scene: Scene, t: Array, collisions: Iterable[Collision] = ()) -> Trajectory:
