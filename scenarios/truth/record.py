@@ -271,12 +271,8 @@ def remains(scene: Scene, legs: Array, disks: Sequence[int], end: float) -> Iter
     """Sentences on what holds for these disks after the end: their momentum along the walls they
     touch, if all these are parallel, is conserved, and their energy does not grow."""
     ours = [i for i in sorted(set(disks)) if i < scene.n and not scene.static[i]]
-    last = [legs[(legs[:, DISK] == i) & (legs[:, T] <= end)][-1] for i in ours]
-    x, v = (
-        np.array(part)
-        for part in zip(*(along(leg[None], np.array([end]), scene.restitution) for leg in last))
-    )
-    x, v, mass = x[:, 0], v[:, 0], scene.mass[ours]
+    last = np.array([legs[(legs[:, DISK] == i) & (legs[:, T] <= end)][-1] for i in ours])
+    (x, v), mass = along(last, np.full(len(last), end), scene.restitution), scene.mass[ours]
     share, distance = nearest(x, scene.walls)
     touched = distance - scene.radius[ours][:, None] < TOUCH
     near = (scene.walls[:, 1] - scene.walls[:, 0])[touched.any(axis=0)]
