@@ -15,16 +15,8 @@ from crosscheck2d.scenarios.truth.exact import computed
 from crosscheck2d.scenarios.truth.oracle.numbers import mpfr
 from tests.scenarios.test_oracle import asked, states
 
-ALONE = Scene(
-    position=[[0.3, -0.2]],
-    velocity=[[1.0, 0.5]],
-    angle=[0.7],
-    angular_velocity=[-3.0],
-    radius=[0.25],
-    mass=[2.0],
-    restitution=0.5,
-    gravity=[0.0, -9.8],
-)
+SPIN = {"angle": [0.7], "angular_velocity": [-3.0]}
+ALONE = lay_out([[0.3, -0.2]], [1.0, 0.5], 0.25, 2.0, 0.5, gravity=[0.0, -9.8], **SPIN)
 
 
 def quadrature(scene: Scene, thrusts: list[Thrust], until: float) -> np.ndarray:

@@ -424,15 +424,7 @@ def test_a_settling_box_is_answered_far_beyond_its_first_rest():
 
 def test_round_the_end_of_a_wall_no_momentum_is_said_to_stay():
     # there the normal of the wall turns with the disk
-    scene = Scene(
-        position=np.array([[0.0, 0.5]]),
-        velocity=np.array([[2.0, 0.0]]),
-        radius=np.array([0.5]),
-        mass=np.ones(1),
-        restitution=0.0,
-        gravity=np.array([0.0, -9.81]),
-        walls=np.array([[[-10.0, 0.0], [1.0, 0.0]]]),
-    )
+    scene = falling([[0, 0.5]], [2, 0], 0.0, [[[-10, 0], [1, 0]]], radius=0.5)
     record = computed(asked(scene, 2.0))
 
     assert record.horizon == pytest.approx(0.5)
