@@ -73,13 +73,8 @@ def sampled(
 def play_pymunk(scenario: Scenario, dt: float, asked: dict[str, Any]) -> Samples:
     scene, space = scenario.scene, pymunk.Space()
     space.gravity = tuple(scene.gravity.tolist())
-    for name in (
-        "iterations",
-        "collision_slop",
-        "collision_bias",
-        "collision_persistence",
-        "damping",
-    ):
+    biases = ("collision_slop", "collision_bias", "collision_persistence")
+    for name in ("iterations", "damping", *biases):
         if name in asked:
             setattr(space, name, asked[name])
     elasticity, friction, bodies = asked["elasticity"], asked["friction"], []
@@ -128,10 +123,8 @@ def play_box2d(scenario: Scenario, dt: float, asked: dict[str, Any]) -> Samples:
     edges."""
     scene = scenario.scene
     # Units a metre, s a unit, units a m/s.
-    length, time = (
-        1 / float(asked.get("unit of length in m", 1.0)),
-        float(asked.get("unit of time in s", 1.0)),
-    )
+    length = 1 / float(asked.get("unit of length in m", 1.0))
+    time = float(asked.get("unit of time in s", 1.0))
     speed = length * time
     iterations = [int(word) for word in asked["velocity, position iterations"].split(",")]
     world = Box2D.b2World(gravity=tuple((scene.gravity * (length * time**2)).tolist()))
@@ -247,11 +240,8 @@ def played_box2d_v3(
             )
             body.create_circle_shape(definition, circle)
             mass = pyb2d3.MassData()
-            mass.mass, mass.rotational_inertia, mass.center = (
-                float(scene.mass[i]),
-                float(scene.inertia[i]),
-                (0, 0),
-            )
+            mass.mass, mass.rotational_inertia = float(scene.mass[i]), float(scene.inertia[i])
+            mass.center = (0, 0)
             body.mass_data = mass
         bodies.append(body)
     angles = scene.angle.copy()
