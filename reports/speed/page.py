@@ -16,34 +16,12 @@ from crosscheck2d.adapters.mechanisms.table import NAMES
 from crosscheck2d.reports.compare.order import ELSEWHERE, UNSTEADY
 from crosscheck2d.reports.compare.pareto import ACCURACIES, front, said_of_cheaper
 from crosscheck2d.reports.compare.pooling import WHO, said_of_pool, without_idle
-from crosscheck2d.reports.page import situations, style
+from crosscheck2d.reports.page import kit, situations, style
 from crosscheck2d.reports.page.drawing import Line, draw_lines, new_figure, svg_of
-from crosscheck2d.reports.page.kit import (
-    Chart,
-    Page,
-    Part,
-    Section,
-    Table,
-    TableCell,
-    Text,
-    render_page,
-    run_section,
-)
 from crosscheck2d.reports.page.links import neighbours
 from crosscheck2d.reports.page.style import number
 from crosscheck2d.reports.run.scenes import open_scene
-from crosscheck2d.reports.speed.budget import (
-    ALL,
-    INTERPLAY,
-    LEAST,
-    RESIDUAL,
-    SUM,
-    TIME,
-    TO,
-    TOTAL,
-    cut_scenes,
-    explained_share,
-)
+from crosscheck2d.reports.speed import budget
 from crosscheck2d.reports.speed.ladder import scored
 from crosscheck2d.reports.speed.tables import Results, end_of_all_pairs, names_of, pooled_sweeps
 from crosscheck2d.reports.terminal.counts import counted
@@ -80,12 +58,12 @@ def text(key: str, part: str, **values: Any) -> str:
     return FORMAT.vformat(words, (), values).strip()
 
 
-def section(key: str, parts: Sequence[Part], **values: Any) -> Section:
+def section(key: str, parts: Sequence[kit.Part], **values: Any) -> kit.Section:
     folded = TEXT[key].get("folded", False)
-    return Section(text(key, "title"), text(key, "says", **values), parts, folded, key)
+    return kit.Section(text(key, "title"), text(key, "says", **values), parts, folded, key)
 
 
-def table(key: str, frame: pd.DataFrame, cells: Mapping[str, Any] | None = None) -> Table:
+def table(key: str, frame: pd.DataFrame, cells: Mapping[str, Any] | None = None) -> kit.Table:
     """A table with a row for each of a frame; `cells` are columns beside those of the frame."""
     frame = frame.assign(**cells or {})
     if "profile" in frame:
@@ -98,7 +76,7 @@ def table(key: str, frame: pd.DataFrame, cells: Mapping[str, Any] | None = None)
     index = [row[TEXT[key].get("label", "name")] for row in rows]
     known = {name: TEXT[key][name] for name in ("sortable", "css", "corner") if name in TEXT[key]}
     data = pd.DataFrame(columns, index=index, dtype=object)
-    return Table(data, caption=text(key, "caption", count=len(frame)), **known)
+    return kit.Table(data, caption=text(key, "caption", count=len(frame)), **known)
 
 
 def write_page(path: Path, results: Results, about: Mapping[str, Any]) -> None:
@@ -124,17 +102,17 @@ def write_page(path: Path, results: Results, about: Mapping[str, Any]) -> None:
         scenes_section(results),
     ]
     if items := [f"{what}: {reason}" for what, reason in results.measured.left_out]:
-        sections.append(Section(f"Left out: {len(items)}", "", [Text(items=items)], True))
-    page = Page(
+        sections.append(kit.Section(f"Left out: {len(items)}", "", [kit.Text(items=items)], True))
+    page = kit.Page(
         "Speed against accuracy",
-        [*sections, run_section(about)],
+        [*sections, kit.run_section(about)],
         GENERATOR,
         lead,
         names=[*plan.engines, *(sweep.name for sweep in plan.sweeps)],
         links=neighbours(path, "speed"),
         footer=text("page", "footer", command=about["command"]),
     )
-    put_text(path, render_page(page))
+    put_text(path, kit.render_page(page))
 
 
 def failures(frame: pd.DataFrame) -> list[str]:
@@ -155,7 +133,7 @@ def seed_intervals(frame: pd.DataFrame) -> list[str]:
     return intervals(frame.seeds > 1, frame.error_low, frame.error_high, otherwise=NOT_REACHED)
 
 
-def situation_section(results: Results) -> list[Section]:
+def situation_section(results: Results) -> list[kit.Section]:
     points, plan = results.points, results.plan
     of_scene = {}
     for scene in plan.effort.scenes:
@@ -174,13 +152,15 @@ def situation_section(results: Results) -> list[Section]:
         cells = zip(median.error, median.cost)
         rows.append(
             [
-                TableCell(error, css="best" if error == best else "", side=f"{number(cost)} µs/s")
+                kit.TableCell(
+                    error, css="best" if error == best else "", side=f"{number(cost)} µs/s"
+                )
                 for error, cost in cells
             ]
         )
-    notes = [TableCell(t, notes=(TableCell(situations.SITUATIONS[t]),)) for t in titles]
+    notes = [kit.TableCell(t, notes=(kit.TableCell(situations.SITUATIONS[t]),)) for t in titles]
     frame = pd.DataFrame(rows, notes, names, dtype=object)
-    return [section("which", [Table(frame)])] if titles else []
+    return [section("which", [kit.Table(frame)])] if titles else []
 
 
 def drawn_lines(points: pd.DataFrame) -> list[Line]:
@@ -220,7 +200,7 @@ def write_picture(path: Path, kept: pd.DataFrame) -> None:
     put_text(path, drawn(drawn_lines(points), label, alone=True))
 
 
-def pooled_section(results: Results) -> Section:
+def pooled_section(results: Results) -> kit.Section:
     pooled, scenes = results.pooled, counted(len(results.asks), "scene")
     caption = text(
         "pooled",
@@ -232,18 +212,18 @@ def pooled_section(results: Results) -> Section:
         lowest=LOWEST,
     )
     svg = drawn(drawn_lines(pooled), "error against cost")
-    parts = [Chart(svg, "Error against cost", caption), reached_table(results)]
+    parts = [kit.Chart(svg, "Error against cost", caption), reached_table(results)]
     return section("pooled", parts, noise=results.noise_sentence)
 
 
-def reached_table(results: Results) -> Table:
+def reached_table(results: Results) -> kit.Table:
     reached = results.pooled_reached
-    cells = [TableCell(cost_of(row), row["why"]) for row in reached.to_dict("records")]
+    cells = [kit.TableCell(cost_of(row), row["why"]) for row in reached.to_dict("records")]
     reached = reached.assign(name=names_of, cell=cells)
     frame = reached.pivot(index="name", columns="accuracy", values="cell")
     frame = frame.loc[[*dict.fromkeys(reached.name)], [*ACCURACIES]]
     caption = text("reached", "caption", cheaper=said_of_cheaper(results.pooled_reached))
-    return Table(frame, corner="Engine", caption=caption)
+    return kit.Table(frame, corner="Engine", caption=caption)
 
 
 def cost_of(row: Mapping[Hashable, Any]) -> str:
@@ -255,78 +235,85 @@ def cost_of(row: Mapping[Hashable, Any]) -> str:
     return f"{row['got']} of {row['of']}" if row["of"] > 1 else NOT_REACHED
 
 
-def budget_sections(results: Results) -> list[Section]:
-    budget, explained = results.measured.budget, results.explained
-    if budget.empty:
+def budget_sections(results: Results) -> list[kit.Section]:
+    frame, explained = results.measured.budget, results.explained
+    if frame.empty:
         return []
     texts = [text("budget", "reference"), text("budget", "sum")]
     absent = [name for name in results.plan.engines if name not in set(names_of(explained))]
     if absent:
         texts.append(text("budget", "absent", names=", ".join(absent)))
-    closed = float(budget.closed_deviation_radii.max())
-    parts: list[Part] = [
-        Text(texts),
-        overview(budget),
-        Text(items=[f"{name}: {text('terms', name)}" for name in TEXT["terms"]]),
-        Text([text("budget", "flight", closed=closed)]),
+    closed = float(frame.closed_deviation_radii.max())
+    parts: list[kit.Part] = [
+        kit.Text(texts),
+        overview(frame),
+        kit.Text(items=[f"{name}: {text('terms', name)}" for name in TEXT["terms"]]),
+        kit.Text([text("budget", "flight", closed=closed)]),
     ]
-    if len(cuts := cut_scenes(explained)):
+    if len(cuts := budget.cut_scenes(explained)):
         share = (100 * cuts.until_s / cuts.horizon_s).map("{:.0f}".format)
         parts.append(table("cut", cuts, {"share": share}))
-    parts.append(contributions(budget))
-    changed = budget[budget[["off_engine_radii", "off_reference_radii"]].max(axis=1) > LEAST]
+    parts.append(contributions(frame))
+    changed = frame[frame[["off_engine_radii", "off_reference_radii"]].max(axis=1) > budget.LEAST]
     if len(changed):
         parts.append(table("disabled", changed))
-    return [section("budget", parts, share=explained_share(explained))]
+    return [section("budget", parts, share=budget.explained_share(explained))]
 
 
-def causes(budget: pd.DataFrame) -> list[str]:
-    contributions = set(budget.contribution)
-    return [TIME, *(name for name in NAMES if name in contributions)]
+def causes(parts: pd.DataFrame) -> list[str]:
+    contributions = set(parts.contribution)
+    return [budget.TIME, *(name for name in NAMES if name in contributions)]
 
 
-def overview(budget: pd.DataFrame) -> Table:
+def overview(parts: pd.DataFrame) -> kit.Table:
     """In how many scenes an engine was played, has an error, has it explained, and in how many
     each contribution is the largest; every engine has its row, also one that failed them all."""
-    columns = ["played", "errors", "explained", *causes(budget)]
+    columns = ["played", "errors", "explained", *causes(parts)]
     rows = {}
-    for (engine, profile), group in budget.groupby(WHO, sort=False):
+    for (engine, profile), group in parts.groupby(WHO, sort=False):
         played = group[group.note == ""]
         scenes = played.pivot(index="scenario", columns="contribution", values="position_radii")
-        scenes = scenes.reindex(columns=[TOTAL, RESIDUAL, *causes(budget)]).fillna(0.0)
-        off, known = scenes[scenes[TOTAL] > LEAST], scenes[causes(budget)]
-        largest = known[known.max(axis=1) > LEAST].idxmax(axis=1)
-        within = int((off[RESIDUAL] <= TO[0] * off[TOTAL]).sum())
+        scenes = scenes.reindex(columns=[budget.TOTAL, budget.RESIDUAL, *causes(parts)]).fillna(0.0)
+        off, known = scenes[scenes[budget.TOTAL] > budget.LEAST], scenes[causes(parts)]
+        largest = known[known.max(axis=1) > budget.LEAST].idxmax(axis=1)
+        within = int((off[budget.RESIDUAL] <= budget.TO[0] * off[budget.TOTAL]).sum())
         counts = [int((largest == cause).sum()) for cause in known.columns]
         rows[f"{engine}:{profile}"] = [len(scenes), len(off), within, *counts]
     frame = pd.DataFrame(rows, columns, dtype=object).T
-    return Table(frame, corner="Engine", caption=text("budget", "overview"))
+    return kit.Table(frame, corner="Engine", caption=text("budget", "overview"))
 
 
-def contributions(budget: pd.DataFrame) -> Table:
+def contributions(parts: pd.DataFrame) -> kit.Table:
     # a row for each scene, which opens the root mean squares of each engine in radii
-    opens: dict[str, list[Part]] = {}
+    opens: dict[str, list[kit.Part]] = {}
     extents = {}
-    for scene, here in budget.groupby("scenario", sort=False):
+    for scene, here in parts.groupby("scenario", sort=False):
         here = here.assign(name=names_of)
         wide = here.pivot(index="name", columns="contribution", values="position_radii")
-        of_anybody = [c for c in causes(budget) if c in wide and wide[c].max() > LEAST]
-        columns = [TOTAL, RESIDUAL, *of_anybody, INTERPLAY, SUM, ALL]
+        of_anybody = [c for c in causes(parts) if c in wide and wide[c].max() > budget.LEAST]
+        columns = [
+            budget.TOTAL,
+            budget.RESIDUAL,
+            *of_anybody,
+            budget.INTERPLAY,
+            budget.SUM,
+            budget.ALL,
+        ]
         wide = wide.reindex(columns=columns, index=[*dict.fromkeys(here.name)])
         notes = here[here.note != ""]
         items = [text("budget", "failed", name=n, note=x) for n, x in zip(notes.name, notes.note)]
         label = f"budget of {scene}"  # a row's label is its address
         opens[label] = [
-            Table(wide.astype(object), caption=text("budget", "all")),
-            Text(items=items),
+            kit.Table(wide.astype(object), caption=text("budget", "all")),
+            kit.Text(items=items),
         ]
         extents[label] = here[["until_s", "horizon_s", "duration_s"]].iloc[0].tolist()
     headings = ["evaluated to, s", "exact answer to, s", "duration, s"]
     frame = pd.DataFrame.from_dict(extents, "index", columns=headings).astype(object)
-    return Table(frame, corner="All contributions in", opens=opens)
+    return kit.Table(frame, corner="All contributions in", opens=opens)
 
 
-def option_sections(results: Results) -> list[Section]:
+def option_sections(results: Results) -> list[kit.Section]:
     scenes = results.plan.effort.option_scenes
     if results.options.empty:
         return []
@@ -334,11 +321,11 @@ def option_sections(results: Results) -> list[Section]:
     return [section("options", parts, count=len(scenes), scenes=", ".join(scenes))]
 
 
-def options_table(options: pd.DataFrame) -> Table:
+def options_table(options: pd.DataFrame) -> kit.Table:
     return table("options", options, {"failure": failures(options)})
 
 
-def sweep_sections(results: Results) -> list[Section]:
+def sweep_sections(results: Results) -> list[kit.Section]:
     if results.sweeps.empty:
         return []
     pooled, absent = pooled_sweeps(results.sweeps)
@@ -352,17 +339,17 @@ def sweep_sections(results: Results) -> list[Section]:
         names = ", ".join(f"{engine} in {scene}" for engine, scene in absent)
         caption += f" {text('sweeps', 'without', names=names)}"
     x, y = "time / time as matched", "error / error as matched"
-    chart = Chart(drawn(lines, "error against cost of sweeps", x, y, ""), "Pooled", caption)
+    chart = kit.Chart(drawn(lines, "error against cost of sweeps", x, y, ""), "Pooled", caption)
     return [section("sweeps", [chart, sweeps_table(results.sweeps)])]
 
 
-def sweeps_table(sweeps: pd.DataFrame) -> Table:
+def sweeps_table(sweeps: pd.DataFrame) -> kit.Table:
     change = sweeps.change.replace("", NOT_REACHED)
     cells = {"change": change, "failure": failures(sweeps), "interval": seed_intervals(sweeps)}
     return table("sweeps", sweeps, cells)
 
 
-def size_sections(results: Results) -> list[Section]:
+def size_sections(results: Results) -> list[kit.Section]:
     costs = results.sizes.assign(name=names_of)
     if costs.empty:
         return []
@@ -373,14 +360,14 @@ def size_sections(results: Results) -> list[Section]:
     title = "Cost of a step against the number of disks"
     svg = drawn(lines, title, "disks", "engine time of a step, µs", "")
     costs["cell"] = [
-        TableCell(row.cost, quartiles(row), side=f"worst {number(row.worst)}")
+        kit.TableCell(row.cost, quartiles(row), side=f"worst {number(row.worst)}")
         for row in costs.itertuples()
     ]
     steps = costs.pivot(index="name", columns="n", values="cell").fillna("")
     steps = steps.loc[[*dict.fromkeys(costs.name)]].rename(columns="{} disks".format)
-    parts: list[Part] = [
-        Chart(svg, title, text("sizes", "caption")),
-        Table(steps, corner="µs a step"),
+    parts: list[kit.Part] = [
+        kit.Chart(svg, title, text("sizes", "caption")),
+        kit.Table(steps, corner="µs a step"),
         growth_table(results.growth),
     ]
     if len(results.pile):
@@ -388,7 +375,7 @@ def size_sections(results: Results) -> list[Section]:
     return [section("sizes", parts, sentence=end_of_all_pairs(costs))]
 
 
-def growth_table(growth: pd.DataFrame) -> Table:
+def growth_table(growth: pd.DataFrame) -> kit.Table:
     known = np.isfinite(growth.exponent)
     cells = intervals(known, growth.low, growth.high, otherwise="too few sizes")
     return table("growth", growth, {"interval": cells})
@@ -398,21 +385,21 @@ def quartiles(row: Any) -> str:
     return f"{number(row.low)} to {number(row.high)}, fastest {number(row.best)}"
 
 
-def scenes_section(results: Results) -> Section:
+def scenes_section(results: Results) -> kit.Section:
     points = results.points.assign(name=names_of)
-    rows, opens = {}, dict[str, list[Part]]()
+    rows, opens = {}, dict[str, list[kit.Part]]()
     for key, here in points.groupby("scenario", sort=False):
         scene, fine = str(key), here[np.isfinite(here.error)]
         best = fine.name[fine.error.idxmin()] if len(fine) else ""
         until, whole = here.until_s.iloc[0], here.duration_s.iloc[0]
-        rows[scene] = [TableCell(results.asks[scene]), until, whole, best]
+        rows[scene] = [kit.TableCell(results.asks[scene]), until, whole, best]
         opens[scene] = scene_parts(results, scene, here)
     headings = ["question", "scored to, s", "duration, s", "nearest engine"]
     frame = pd.DataFrame.from_dict(rows, "index", columns=headings, dtype=object)
-    return section("scenes", [Table(frame, (), (), opens, True, "text", "Scene")])
+    return section("scenes", [kit.Table(frame, (), (), opens, True, "text", "Scene")])
 
 
-def scene_parts(results: Results, scene: str, points: pd.DataFrame) -> list[Part]:
+def scene_parts(results: Results, scene: str, points: pd.DataFrame) -> list[kit.Part]:
     noise, seeds = results.noise_floor(scene), int(points.seeds.max())
     until, whole = points.until_s.iloc[0], points.duration_s.iloc[0]
     says = {
@@ -433,7 +420,7 @@ def scene_parts(results: Results, scene: str, points: pd.DataFrame) -> list[Part
     cells: dict[str, list[Any]] = {
         "interval": intervals(np.isfinite(orders.slope), orders.low, orders.high, 2),
         "verdict": [
-            TableCell(VERDICTS.get(v, v), css="bad" if v in (ELSEWHERE, UNSTEADY) else "")
+            kit.TableCell(VERDICTS.get(v, v), css="bad" if v in (ELSEWHERE, UNSTEADY) else "")
             for v in orders.verdict
         ],
         "failure": [f"{k} of {n}" if k else "" for k, n in zip(orders.failed, orders.steps)],
@@ -442,15 +429,15 @@ def scene_parts(results: Results, scene: str, points: pd.DataFrame) -> list[Part
         here = reached[reached.accuracy == accuracy]
         both = orders[WHO].merge(here, on=WHO, how="left")
         cells[accuracy] = [
-            TableCell(row.why, css="soft")
+            kit.TableCell(row.why, css="soft")
             if np.isnan(row.cost)
-            else TableCell(row.cost, f"at dt {number(row.dt_s)} s")
+            else kit.TableCell(row.cost, f"at dt {number(row.dt_s)} s")
             for row in both.itertuples()
         ]
-    return [Chart(svg, "", caption), table("orders", orders, cells), points_table(points)]
+    return [kit.Chart(svg, "", caption), table("orders", orders, cells), points_table(points)]
 
 
-def points_table(points: pd.DataFrame) -> Table:
+def points_table(points: pd.DataFrame) -> kit.Table:
     rows = zip(failures(points), points.failed, points.seeds)
     failure = [f"{k} of {n}: {reason}" if k else "" for reason, k, n in rows]
     return table("points", points, {"failure": failure, "interval": seed_intervals(points)})

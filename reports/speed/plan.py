@@ -20,6 +20,10 @@ SCENE, OPTION, SWEEP = "scene", "option", "sweep"
 PLAIN = ""  # the change of an engine that is not changed
 
 
+def names(text: str) -> tuple[str, ...]:
+    return tuple(text.split())
+
+
 @dataclass(frozen=True)
 class Effort:
     # what is measured if nothing is asked for; in the quick form one of each kind, so that no one
@@ -39,12 +43,8 @@ class Effort:
     budget_scenes: tuple[str, ...]
     # in which options are changed: three disks, a collision that thresholds affect, one disk under
     # gravity, many collisions, and a stack at rest
-    option_scenes: tuple[str, ...] = (
-        "disk_between_static_disks",
-        "slow_collision",
-        "bouncing_ball_e1",
-        "line_gas",
-        "column_of_ten",
+    option_scenes: tuple[str, ...] = names(
+        "disk_between_static_disks slow_collision bouncing_ball_e1 line_gas column_of_ten"
     )
 
     def ladder(self, scenario: Scenario) -> tuple[int, ...]:
@@ -71,21 +71,10 @@ def doublings(scenario: Scenario, most_steps: int) -> tuple[int, ...]:
 
 
 QUICK = Effort(
-    scenes=(
-        "free_fall",
-        "head_on_unequal_e09",
-        "oblique_e09",
-        "slow_collision",
-        "bouncing_ball_e09",
-        "box_billiard",
-        "disk_between_static_disks",
-        "slide_on_incline",
-        "column_of_ten",
-        "line_gas",
-        "cradle_with_gaps",
-        "body_frame_thrust",
-        "asteroids",
-        "gas_of_100",
+    scenes=names(
+        "free_fall head_on_unequal_e09 oblique_e09 slow_collision bouncing_ball_e09 box_billiard "
+        "disk_between_static_disks slide_on_incline column_of_ten line_gas cradle_with_gaps "
+        "body_frame_thrust asteroids gas_of_100"
     ),
     seeds=6,
     most_steps=4_000,
@@ -94,20 +83,10 @@ QUICK = Effort(
     sizes=(3, 10, 30, 100, 300, 1000, 3000, 10_000),
     patience=0.1,
     sweep_scenes=("column_of_ten", "falling_box", "slide_on_incline"),
-    budget_scenes=(
-        "free_fall",
-        "head_on_equal_e09",
-        "oblique_e1",
-        "slow_collision",
-        "mass_ratios",
-        "wall_to_wall",
-        "bouncing_ball_e1",
-        "disk_between_static_disks",
-        "line_gas",
-        "cradle_with_gaps",
-        "column_of_ten",
-        "asteroids",
-        "gas_of_100",
+    budget_scenes=names(
+        "free_fall head_on_equal_e09 oblique_e1 slow_collision mass_ratios wall_to_wall "
+        "bouncing_ball_e1 disk_between_static_disks line_gas cradle_with_gaps column_of_ten "
+        "asteroids gas_of_100"
     ),
 )
 FULL = Effort(

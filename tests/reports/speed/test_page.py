@@ -239,6 +239,7 @@ def test_figures_come_back_as_they_were_kept(results: Results, tmp_path: Path):
     assert "# processor: " in path.read_text()
     assert "# pymunk: 7" in path.read_text()
     assert ("pymunk:matched", 100) in kept
+    assert results.sizes.worst.notna().all()
     assert figures.drifted(kept, kept) == []
 
 
@@ -301,9 +302,3 @@ def test_the_page_opens_every_scene_and_asks_nothing_of_anywhere(
     assert tab.get_by_text("no <b>such</b> thing").count() > 0
     assert tab.locator("b:text('such')").count() == 0
     assert heard == []
-
-
-def test_a_settled_pile_is_a_row_with_sleeping_and_without(results: Results):
-    assert [*results.pile.name] == ["pymunk:matched"]
-    assert (results.pile[["", "sleeping"]] > 0).all(axis=None)
-    assert results.sizes.worst.notna().all()
