@@ -8,6 +8,7 @@ import os
 import sys
 from collections.abc import Mapping, Sequence
 from math import inf, isfinite, nan
+from operator import attrgetter
 from typing import Any, NoReturn
 
 import numpy as np
@@ -35,13 +36,25 @@ from crosscheck2d.reports.terminal.progress import Progress
 
 Row = dict[str, Any]
 SHOWN = 3  # ranks: the cheapest and the next two
+# fields of the answer, and of its rows -> attributes
+ANSWER = {"scenario": "scene", "purpose": "purpose", "error_at_most": "bound", "until_s": "until"}
+ANSWER |= {"duration_s": "duration", "collisions_judged": "collisions", "dt_s_tried": "step_sizes"}
+ATTEMPT = {"engine": "name", "library": "is_library", "dt_s": "dt", "error": "error"}
+CHANGE = {"change": "changed.change", "error_without": "plain.error"}
+NINE, AT = "9 of 10\nuntil, s", "at dt,\nms"
+SHORT = {  # and headings
+    "error_at_finest": ("finest", ""),
+    "kept_until_s": ("usual.until", "until,\ns"),
+    "kept_from_nine_tenths_until_s": ("usual.lasting", NINE),
+    "at_dt_s": ("usual.dt", AT),
+    "longest_until_s": ("longest.until", "longest\nuntil,\ns"),
+    "longest_from_nine_tenths_until_s": ("longest.lasting", NINE),
+    "longest_at_dt_s": ("longest.dt", AT),
+    "why": ("reason", ""),
+}
 # tables: a field of their rows -> its heading; step sizes are shown in ms
 CHOICES = {"rank": "", "engine": "engine", "dt_s": "dt, ms", "error": "error"}
 CHOICES |= {"error_of_nine_tenths": "9 of 10\nwithin", "us_per_simulated_s": "µs per\nsimulated s"}
-NINE, AT = "9 of 10\nuntil, s", "at dt,\nms"
-KEPT = {"kept_until_s": "until,\ns", "kept_from_nine_tenths_until_s": NINE, "at_dt_s": AT}
-KEPT |= {"longest_until_s": "longest\nuntil,\ns", "longest_from_nine_tenths_until_s": NINE}
-KEPT |= {"longest_at_dt_s": AT}
 
 
 def give_advice(
@@ -92,61 +105,36 @@ def snippet_of(advice: Advice, scene: str, seed: int) -> str:
 def answer_of(advice: Advice) -> Row:
     """The advice as `--json` gives it, where a number that is not finite is null."""
 
-    def row(attempt: Attempt, **more: Any) -> Row:
-        cost = {"error": attempt.error, "us_per_simulated_s": attempt.cost * 1e6}
-        who = {"engine": attempt.name, "library": attempt.is_library, "dt_s": attempt.dt}
-        return who | cost | more
+    def row(attempt: Attempt) -> Row:
+        return fields(attempt, ATTEMPT) | {"us_per_simulated_s": attempt.cost * 1e6}
 
     ranked = [
-        row(
-            attempt,
-            rank=rank,
-            error_of_nine_tenths=attempt.usually,
-            kept_in=attempt.kept_in(advice.bound),
-            starts=len(attempt.starts),
-        )
+        row(attempt)
+        | {"rank": rank, "error_of_nine_tenths": attempt.usually}
+        | {"kept_in": attempt.kept_in(advice.bound), "starts": len(attempt.starts)}
         for rank, attempt in advice.ranked
     ]
-    short = [
-        row(
-            engine.best,
-            error_at_finest=engine.finest,
-            kept_until_s=engine.usual.until,
-            kept_from_nine_tenths_until_s=engine.usual.lasting,
-            at_dt_s=engine.usual.dt,
-            longest_until_s=engine.longest.until,
-            longest_from_nine_tenths_until_s=engine.longest.lasting,
-            longest_at_dt_s=engine.longest.dt,
-            why=engine.reason,
-        )
-        for engine in advice.short
-    ]
     changes = [
-        row(
-            change.changed,
-            change=change.changed.change,
-            error_without=change.plain.error,
-            cost_ratio=change.changed.cost / change.plain.cost,
-            verdict=change.verdict(advice.bound, advice.floor),
-        )
+        row(change.changed)
+        | fields(change, CHANGE)
+        | {"cost_ratio": change.changed.cost / change.plain.cost}
+        | {"verdict": change.verdict(advice.bound, advice.floor)}
         for change in advice.changes
     ]
-    return {
-        "scenario": advice.scene,
-        "purpose": advice.purpose,
-        "error_at_most": advice.bound,
-        "until_s": advice.until,
-        "duration_s": advice.duration,
-        "collisions_judged": advice.collisions,
-        "dt_s_tried": list(advice.step_sizes),
+    ends = {field: attribute for field, (attribute, _) in SHORT.items()}
+    return fields(advice, ANSWER) | {
         "cheapest_first": ranked,
-        "not_within": short,
-        "not_to_the_end": [row(attempt, why=attempt.reason) for attempt in advice.partial],
+        "not_within": [row(x.best) | fields(x, ends) for x in advice.short],
+        "not_to_the_end": [row(x) | {"why": x.reason} for x in advice.partial],
         "changes": changes,
         "noise": advice.noise,
         "cores_busy": advice.busy,
         "statistics": answer_of(advice.statistics) if advice.statistics else None,
     }
+
+
+def fields(of: Any, attributes: Mapping[str, str]) -> Row:
+    return {field: attrgetter(path)(of) for field, path in attributes.items()}
 
 
 def finite(value: Any) -> Any:
@@ -243,7 +231,8 @@ def print_short(console: Console, advice: Advice, short: Sequence[Row], group: s
     title = f"{group} that do not keep it"
     if advice.purpose in LASTING:
         title += f" to {number(advice.until)} s, and until when"
-        headings = {"engine": "engine"} | KEPT | finest
+        kept = {field: heading for field, (_, heading) in SHORT.items() if heading}
+        headings = {"engine": "engine"} | kept | finest
         note = (
             f"At the usual step size, and at that of {coarse} to {fine} ms which keeps it longest;"
             f" 9 of 10: nine tenths of runs from {STARTS} instants of a step keep it until then."
