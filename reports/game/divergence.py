@@ -79,7 +79,8 @@ class Touches:
                 # of a wall, only the disk's centre is known here
                 share = self.radius[i] / (self.radius[i] + self.radius[j]) if j >= 0 else 0.0
                 place = position[i] + share * (position[max(j, 0)] - position[i])
-                self.recent.append(Event(frame, *place.tolist(), (i, j), t))
+                x, y = place.tolist()
+                self.recent.append(Event(frame, x, y, (i, j), t))
                 struck |= {i, j}
 
     def begins(self, collision: ContactImpulse) -> bool:
@@ -126,7 +127,8 @@ def cause_of(
     touches = [touch for touch in touches if disks & set(touch.disks)]
     if not touches:
         disk = min(disks)
-        return Event(first, *state.position[disk].tolist(), (disk,)), True, True
+        x, y = state.position[disk].tolist()
+        return Event(first, x, y, (disk,)), True, True
     # both its disks, if others of them met a right one in the same frame
     at = min(
         touches, key=lambda touch: (any(k >= 0 and k not in disks for k in touch.disks), touch.t)
