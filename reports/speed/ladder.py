@@ -119,15 +119,15 @@ def of_statistics(view: View) -> float:
     scene = view.scenario.scene
     averages = []
     for trajectory in (view.played, view.other):
-        kinetic = laws.kinetic_energy(trajectory, scene)
-        potential = laws.energy(trajectory, scene) - kinetic
+        motion = laws.kinetic_energy(trajectory, scene)
+        height = laws.energy(trajectory, scene) - motion
         way = laws.lengths(laws.nearer_way(trajectory.position - trajectory.position[0], scene))
-        far = way[:, ~scene.static].mean() if not scene.static.all() else 0.0
-        averages.append([float(kinetic.mean()), float(potential.mean()), float(far)])
-    (kinetic, potential, far), (true_kinetic, true_potential, true_far) = averages
+        far = float(way[:, ~scene.static].mean()) if not scene.static.all() else 0.0
+        averages.append((float(motion.mean()), float(height.mean()), far))
+    (kinetic, potential, way_on), (true_kinetic, true_potential, true_way) = averages
     scale = scales.energy(view.scenario) or 1.0
     off = max(abs(kinetic - true_kinetic), abs(potential - true_potential)) / scale
-    return max(off, abs(far - true_far) / true_far if true_far else 0.0)
+    return max(off, abs(way_on - true_way) / true_way if true_way else 0.0)
 
 
 PURPOSES: dict[str, Purpose] = {
