@@ -185,7 +185,8 @@ def one_step_size_at_a_time(measurement: Measurement, workers: int) -> list[dict
     """A ladder whose worker died or hung, played again one step size at a time, so that the
     other step sizes are kept."""
     rows: list[dict[str, Any]] = []
-    alone = {k: measurement._replace(step_sizes=(k,)).errors for k in measurement.step_sizes}
+    steps = measurement.step_sizes
+    alone: dict[Hashable, Any] = {k: measurement._replace(step_sizes=(k,)).errors for k in steps}
     for k, result in run_all(alone, workers, HANGS):
         if isinstance(result, Failure):
             where = measurement.scene, measurement.seed, measurement.name, k

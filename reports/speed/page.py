@@ -68,9 +68,9 @@ def table(key: str, frame: pd.DataFrame, cells: Mapping[str, Any] | None = None)
     frame = frame.assign(**cells or {})
     if "profile" in frame:
         frame["name"] = names_of(frame)
-    rows: list[dict[Hashable, Any]] = frame.to_dict("records")
+    rows: list[Any] = frame.to_dict("records")
     columns = {
-        heading: [FORMAT.vformat(of, (), row) if "{" in of else row[of] for row in rows]  # type: ignore[call-overload]
+        heading: [FORMAT.vformat(of, (), row) if "{" in of else row[of] for row in rows]
         for heading, of in TEXT[key]["columns"].items()
     }
     index = [row[TEXT[key].get("label", "name")] for row in rows]
@@ -147,9 +147,9 @@ def situation_section(results: Results) -> list[kit.Section]:
     names, rows = list(dict.fromkeys(here.name)), []
     titles = [title for title in situations.SITUATIONS if title in set(here.situation)]
     for title in titles:
-        median = medians.loc[title].reindex(names)
-        best = median.error[np.isfinite(median.error)].min()
-        cells = zip(median.error, median.cost)
+        errors = medians.error.loc[title].reindex(names)
+        best = errors[np.isfinite(errors)].min()
+        cells = zip(errors, medians.cost.loc[title].reindex(names))
         rows.append(
             [
                 kit.TableCell(
@@ -212,8 +212,8 @@ def pooled_section(results: Results) -> kit.Section:
         lowest=LOWEST,
     )
     svg = drawn(drawn_lines(pooled), "error against cost")
-    parts = [kit.Chart(svg, "Error against cost", caption), reached_table(results)]
-    return section("pooled", parts, noise=results.noise_sentence)
+    chart = kit.Chart(svg, "Error against cost", caption)
+    return section("pooled", [chart, reached_table(results)], noise=results.noise_sentence)
 
 
 def reached_table(results: Results) -> kit.Table:
