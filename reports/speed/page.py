@@ -218,7 +218,8 @@ def pooled_section(results: Results) -> kit.Section:
 
 def reached_table(results: Results) -> kit.Table:
     reached = results.pooled_reached
-    cells = [kit.TableCell(cost_of(row), row["why"]) for row in reached.to_dict("records")]
+    rows = reached.to_dict("records")
+    cells: list[Any] = [kit.TableCell(cost_of(row), row["why"]) for row in rows]
     reached = reached.assign(name=names_of, cell=cells)
     frame = reached.pivot(index="name", columns="accuracy", values="cell")
     frame = frame.loc[[*dict.fromkeys(reached.name)], [*ACCURACIES]]
@@ -359,10 +360,11 @@ def size_sections(results: Results) -> list[kit.Section]:
     ]
     title = "Cost of a step against the number of disks"
     svg = drawn(lines, title, "disks", "engine time of a step, µs", "")
-    costs["cell"] = [
+    cells: list[Any] = [
         kit.TableCell(row.cost, quartiles(row), side=f"worst {number(row.worst)}")
         for row in costs.itertuples()
     ]
+    costs["cell"] = cells
     steps = costs.pivot(index="name", columns="n", values="cell").fillna("")
     steps = steps.loc[[*dict.fromkeys(costs.name)]].rename(columns="{} disks".format)
     parts: list[kit.Part] = [
@@ -429,10 +431,10 @@ def scene_parts(results: Results, scene: str, points: pd.DataFrame) -> list[kit.
         here = reached[reached.accuracy == accuracy]
         both = orders[WHO].merge(here, on=WHO, how="left")
         cells[accuracy] = [
-            kit.TableCell(row.why, css="soft")
-            if np.isnan(row.cost)
-            else kit.TableCell(row.cost, f"at dt {number(row.dt_s)} s")
-            for row in both.itertuples()
+            kit.TableCell(row["why"], css="soft")
+            if np.isnan(row["cost"])
+            else kit.TableCell(row["cost"], f"at dt {number(row['dt_s'])} s")
+            for row in both.to_dict("records")
         ]
     return [kit.Chart(svg, "", caption), table("orders", orders, cells), points_table(points)]
 
