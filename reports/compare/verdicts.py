@@ -47,12 +47,9 @@ LASTS = 3  # samples in a row
 
 
 class Kind(NamedTuple):
-    """What a verdict is about: the unit of its value, what the value is, and what is said of a run
-    that fails it; in `said` {0} is the value, {1} the value in percent."""
-
     unit: str
-    means: str
-    said: str
+    means: str  # what the value is
+    said: str  # of a run that fails; {0} is the value, {1} the value in percent
 
 
 VERDICTS = {
@@ -74,22 +71,14 @@ VERDICTS = {
 
 @dataclass(frozen=True)
 class Verdict:
-    """A number of a whole run; it fails above `bound`, or if it is not a number.
+    """A number of a whole run; it fails above `bound`, or if it is not a number."""
 
-    Attributes:
-        id: a key of `VERDICTS`, which has the unit.
-        value, bound: in that unit.
-        at: s, the first sample that fails, else that of the value; nan: the whole run.
-        disks: those concerned, a wall w as -1 - w; (): all.
-        event: what happens, where that is more than the words of `VERDICTS`.
-    """
-
-    id: str
+    id: str  # a key of `VERDICTS`, which has the unit of value and bound
     value: float
     bound: float
-    at: float = np.nan
-    disks: tuple[int, ...] = ()
-    event: str = ""
+    at: float = np.nan  # s, the first sample that fails, else that of the value; nan: the whole run
+    disks: tuple[int, ...] = ()  # those concerned, a wall w as -1 - w; (): all
+    event: str = ""  # what happens, where that is more than the words of `VERDICTS`
 
     @property
     def failed(self) -> bool:
@@ -111,12 +100,8 @@ def verdicts(
     rounding: float = FLOAT64,
     truth: Trajectory | None = None,
 ) -> list[Verdict]:
-    """Every verdict that applies to a run with steps of `dt` s, in the order of `VERDICTS`.
-
-    Args:
-        rounding: relative, of the numbers that the engine keeps.
-        truth: the exact answer up to its horizon, if there is one.
-    """
+    """Every verdict that applies to a run with steps of `dt` s, in the order of `VERDICTS`;
+    `rounding`: relative, of the engine's numbers; `truth`: the exact answer up to its horizon."""
     if len(played) < LASTS:
         return []
     judge = Judge(scenario, played, dt, rounding, truth)
@@ -148,14 +133,11 @@ def in_words(kind: str, value: float) -> str:
 
 
 class Pair(NamedTuple):
-    """A disk beside m others, or beside one wall w, -1 - w: their numbers (m,); their overlap
-    (k, m) in m; the way between their centres (k, m, 2) m; the radius (m,) of the smaller disk."""
-
     disk: int
-    others: NDArray[np.int64]
-    overlap: Array
-    way: Array
-    smaller: Array
+    others: NDArray[np.int64]  # (m,), or one wall w, -1 - w
+    overlap: Array  # (k, m) m
+    way: Array  # (k, m, 2) m, between their centres
+    smaller: Array  # (m,) m, the radius of the smaller disk
 
 
 @dataclass(frozen=True, eq=False)

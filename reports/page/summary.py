@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -35,8 +35,8 @@ from crosscheck2d.reports.page.scenes import (
     smooth,
 )
 from crosscheck2d.reports.page.situations import FRICTION, SITUATIONS, SPIN
-from crosscheck2d.reports.run.timing import Noise, noise_of
-from crosscheck2d.reports.run.timing_pass import BUSY, COLUMNS
+from crosscheck2d.reports.run.timing import Noise
+from crosscheck2d.reports.run.timing_pass import BUSY
 from crosscheck2d.reports.terminal.counts import counted, listed
 
 WITHOUT = "All"
@@ -55,37 +55,30 @@ MOST_WORDS = 2  # in a cell
 
 
 class RunTimes(NamedTuple):
-    """The times of a run.
-
-    Attributes:
-        table: timings.csv.
-        noise: the ratios of two timings of one engine.
-        limit: of the timing pass, s.
-        again: the command that takes the times.
-    """
+    """timings.csv of a run, and why no time of it is shown, as a sentence; "" if times are."""
 
     table: pd.DataFrame
-    noise: Noise
-    limit: float
-    again: str = ""
-
-    @property
-    def fault(self) -> str:
-        """Why no time is shown, as a sentence; "" if times are shown."""
-        take = f" To take them: {self.again}" if self.again else ""
-        if self.table.empty and not self.limit:
-            return f"No times were taken.{take}"
-        if self.table.empty or not self.noise.pairs:
-            return f"The engines could not be timed within {self.limit:g} s.{take}"
-        if self.noise.floor > BUSY:
-            return (
-                "The machine was busy: an engine timed twice differs from itself by"
-                f" {style.number(100 * self.noise.floor, 2)} %, so no times are shown.{take}"
-            )
-        return ""
+    fault: str
 
 
-NO_CLOCK = RunTimes(pd.DataFrame(columns=COLUMNS), noise_of([]), 0.0)
+NO_CLOCK = RunTimes(pd.DataFrame(), "No times were taken.")
+
+
+def run_times(table: pd.DataFrame, noise: Noise, limit: float, again: str = "") -> RunTimes:
+    """The times of a run, with the ratios of two timings of one engine, the limit of the timing
+    pass in s, and the command that takes them again."""
+    if table.empty and not limit:
+        fault = "No times were taken."
+    elif table.empty or not noise.pairs:
+        fault = f"The engines could not be timed within {limit:g} s."
+    elif noise.floor > BUSY:
+        fault = (
+            "The machine was busy: an engine timed twice differs from itself by"
+            f" {style.number(100 * noise.floor, 2)} %, so no times are shown."
+        )
+    else:
+        return RunTimes(table, "")
+    return RunTimes(table, f"{fault} To take them: {again}" if again else fault)
 
 
 class Choice(NamedTuple):
@@ -100,20 +93,13 @@ class Choice(NamedTuple):
 @dataclass(frozen=True, eq=False)
 class Summary:
     """The scenes of a run, and what the first table says of them. Engines are named
-    `engine:profile`, situations as in `MEANING`.
-
-    Attributes:
-        scenes: all of them.
-        names: every engine that was played.
-        untrusted: those that broke the protocol, and the reader's own that break a law: their rows
-            stay in the tables, but they are not ranked.
-        clock: the times of the run.
-    """
+    `engine:profile`, situations as in `MEANING`."""
 
     scenes: Sequence[SceneScores]
-    names: Sequence[str]
+    names: Sequence[str]  # every engine that was played
+    # those that broke the protocol, and the reader's own that break a law: they are not ranked
     untrusted: frozenset[str] = frozenset()
-    clock: RunTimes = field(default=NO_CLOCK)
+    clock: RunTimes = NO_CLOCK
 
     @cached_property
     def profiles(self) -> dict[str, list[str]]:
@@ -169,9 +155,11 @@ class Summary:
     def error(self, name: str, kind: str) -> float:
         # the median; inf where an engine fails in half of the scenes
         metric = ANGLE if kind == SPIN else ERROR
-        errors = [s.error(stand_in(name, s), metric=metric) for s in self.situations[kind]]
-        known = [error for error in errors if not np.isnan(error)]
-        return float(np.median(known)) if known else np.nan
+        return median([s.error(run, metric=metric) for s, run in self.runs(name, kind)])
+
+    def runs(self, name: str, kind: str) -> list[tuple[SceneScores, str]]:
+        """Each scene of a situation, with the engine that counts there."""
+        return [(scene, stand_in(name, scene)) for scene in self.situations[kind]]
 
     @cached_property
     def times(self) -> dict[tuple[str, str, float], float]:
@@ -194,9 +182,8 @@ class Summary:
 
     def cost(self, name: str, kind: str) -> float:
         # µs of a step, geometric mean of the timed scenes
-        keys = [(scene.name, stand_in(name, scene)) for scene in self.situations[kind]]
-        costs = [self.costs[key] for key in keys if key in self.costs]
-        return float(np.exp(np.mean(np.log(costs)))) if costs else np.nan
+        costs = [self.costs.get((scene.name, run), np.nan) for scene, run in self.runs(name, kind)]
+        return float(np.exp(np.nanmean(np.log(costs)))) if np.isfinite(costs).any() else np.nan
 
     def best(self, kind: str) -> float:
         errors = [self.error(name, kind) for name in self.libraries]
@@ -216,7 +203,7 @@ class Summary:
         """What goes wrong in a situation, the gravest first; each opens its worst scene."""
         if kind == SPIN:
             return []
-        runs = {scene: stand_in(name, scene) for scene in self.situations[kind]}
+        runs = dict(self.runs(name, kind))
         of = f"of {counted(len(runs), 'scene')}"
         words = []
         for verdict in VERDICTS:
@@ -357,6 +344,12 @@ def summarize(
 ) -> Summary:
     names = list(dict.fromkeys(run.name for each in comparisons for run in each.runs))
     return Summary(scenes_of(comparisons), names, frozenset(untrusted), clock)
+
+
+def median(errors: Sequence[float]) -> float:
+    """Of those that are known; nan of none, inf where half of them are."""
+    known = [error for error in errors if not np.isnan(error)]
+    return float(np.median(known)) if known else np.nan
 
 
 def stand_in(name: str, scene: SceneScores) -> str:

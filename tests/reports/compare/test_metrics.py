@@ -10,11 +10,10 @@ import pytest
 from crosscheck2d.adapters.play import play
 from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.compare import laws
-from crosscheck2d.reports.compare.comparison import compare
+from crosscheck2d.reports.compare.comparison import COLUMNS, compare
 from crosscheck2d.reports.compare.delays import jumps_of
 from crosscheck2d.reports.compare.laws import cached
 from crosscheck2d.reports.compare.metrics import METRICS
-from crosscheck2d.reports.compare.table import COLUMNS
 from crosscheck2d.reports.compare.view import NOT_JUDGED, View, cut
 from crosscheck2d.reports.page.findings import nearest, refusals
 from crosscheck2d.reports.page.summary import summarize

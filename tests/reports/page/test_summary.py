@@ -24,7 +24,7 @@ from crosscheck2d.reports.page.situations import (
     STACKS,
     situations_of,
 )
-from crosscheck2d.reports.page.summary import WITHOUT, RunTimes, Summary, summarize
+from crosscheck2d.reports.page.summary import WITHOUT, RunTimes, Summary, run_times, summarize
 from crosscheck2d.reports.page.trade_offs import cost_against_size, error_against_cost, limits
 from crosscheck2d.reports.run.timing import noise_of
 from crosscheck2d.scenarios.catalogue import SCENARIOS, scenario
@@ -178,7 +178,7 @@ def times(comparisons: list[Comparison], pairs: list[float]) -> RunTimes:
         for run in comparison.runs
         if run.status == "ok"
     ]
-    return RunTimes(pd.DataFrame(rows), noise_of(pairs), 1.0)
+    return run_times(pd.DataFrame(rows), noise_of(pairs), 1.0)
 
 
 def test_a_cost_is_that_of_a_step_and_stands_only_where_times_can_be_trusted(
