@@ -104,9 +104,9 @@ def verdicts(
     `rounding`: relative, of the engine's numbers; `truth`: the exact answer up to its horizon."""
     if len(played) < LASTS:
         return []
-    judge = Judge(scenario, played, dt, rounding, truth)
     # a disk thrown far out gives inf or nan
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        judge = Judge(scenario, played, dt, rounding, truth)
         return [*judge.contacts(), *judge.energy(), *judge.flight(), *judge.rest()]
 
 
@@ -140,45 +140,30 @@ class Pair(NamedTuple):
     smaller: Array  # (m,) m, the radius of the smaller disk
 
 
-@dataclass(frozen=True, eq=False)
 class Judge:
-    scenario: Scenario
-    played: Trajectory
-    dt: float
-    rounding: float
-    truth: Trajectory | None
-
-    @cached_property
-    def interval(self) -> float:
-        """s between two samples."""
-        return float(self.played.t[1] - self.played.t[0])
-
-    @cached_property
-    def g(self) -> float:
-        """m/s2."""
-        return float(np.hypot(*self.scenario.scene.gravity))
-
-    @cached_property
-    def speed(self) -> Array:
-        """(k,) m/s, the largest of any disk at the sample before, at and after."""
-        speed: Array = laws.lengths(self.played.velocity).max(axis=1)
+    def __init__(
+        self,
+        scenario: Scenario,
+        played: Trajectory,
+        dt: float,
+        rounding: float,
+        truth: Trajectory | None,
+    ) -> None:
+        self.scenario, self.played, self.dt = scenario, played, dt
+        self.rounding, self.truth = rounding, truth
+        self.interval = float(played.t[1] - played.t[0])  # s between two samples
+        self.g = float(np.hypot(*scenario.scene.gravity))  # m/s2
+        way, wrap = np.diff(played.position, axis=0), scenario.scene.wrap
+        # (k,) m/s, the largest of any disk at the sample before, at and after
+        speed: Array = laws.lengths(played.velocity).max(axis=1)
         speed = np.maximum.reduce([speed, np.append(speed[1:], 0.0), np.append(0.0, speed[:-1])])
-        return speed
-
-    @cached_property
-    def reach(self) -> Array:
-        """(k,) m: gaps above it cannot have closed between the samples beside."""
-        moved = laws.lengths(np.diff(self.played.position, axis=0)).max(axis=1)
-        moved = np.maximum(moved, self.speed[1:] * self.interval)
-        both: Array = 2 * np.maximum(np.append(moved, moved[-1]), np.append(moved[0], moved))
-        return both
-
-    @cached_property
-    def jumps(self) -> NDArray[np.bool_]:
-        """(k - 1, n), where a disk is set onto the opposite edge."""
-        wrap, moved = self.scenario.scene.wrap, np.abs(np.diff(self.played.position, axis=0))
+        self.speed = speed
+        # (k,) m: gaps above it cannot have closed between the samples beside
+        moved = np.maximum(laws.lengths(way).max(axis=1), speed[1:] * self.interval)
+        self.reach = 2 * np.maximum(np.append(moved, moved[-1]), np.append(moved[0], moved))
+        # (k - 1, n), where a disk is set onto the opposite edge
         half = np.array([np.inf, np.inf]) if wrap is None else (wrap[1] - wrap[0]) / 2
-        return np.asarray((moved > half).any(axis=2))
+        self.jumps = (np.abs(way) > half).any(axis=2)
 
     @cached_property
     def pairs(self) -> list[Pair]:

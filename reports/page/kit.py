@@ -6,14 +6,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.metadata import version
-from typing import Any, ClassVar
+from pathlib import Path
+from typing import Any, ClassVar, NamedTuple
 
 import pandas as pd
 from markupsafe import Markup
 
 from crosscheck2d.reports.page import style
 from crosscheck2d.reports.page.documents import ENGINE, deflated, environment, render
-from crosscheck2d.reports.page.links import Neighbour
 
 SCRIPTS = (*ENGINE, "page/kit.js")
 
@@ -139,6 +139,53 @@ class Section:
 Part = Table | Chart | Playback | Text | Code | Section
 
 
+class Neighbour(NamedTuple):
+    """A page; `href`: in `PAGES` below the folder of all results, in a page relative to it, "" if
+    it does not exist."""
+
+    title: str
+    says: str
+    command: str
+    href: str
+
+
+PAGES = {
+    "report": Neighbour(
+        "Report", "every scene, engine by engine", "crosscheck", "latest/report.html"
+    ),
+    "speed": Neighbour(
+        "Speed",
+        "the cost of an accuracy, and what each error is made of",
+        "crosscheck speed",
+        "speed/speed.html",
+    ),
+    "stability": Neighbour(
+        "Limits",
+        "the speed, density or distance at which an engine fails",
+        "crosscheck stability",
+        "stability/stability.html",
+    ),
+    "lessons": Neighbour(
+        "Lessons",
+        "why engines differ, with scenes that run",
+        "crosscheck lesson",
+        "lessons/index.html",
+    ),
+}
+
+
+def neighbours(page: Path, own: str) -> list[Neighbour]:
+    """The pages of `PAGES` besides `own`, as seen from the file `page`: each is looked for at its
+    default path, beside the folder of `page`."""
+    # a folder that is being written is beside its final place, so links found from it are right
+    beside = page.absolute().parent.parent
+    return [
+        page._replace(href=f"../{page.href}" if (beside / page.href).is_file() else "")
+        for key, page in PAGES.items()
+        if key != own
+    ]
+
+
 @dataclass(frozen=True, eq=False)
 class Page:
     title: str  # of the window and of the first heading
@@ -147,7 +194,7 @@ class Page:
     lead: Sequence[str | Markup] = ()  # what stands below the title, a paragraph each
     names: Sequence[str] = ()  # `engine:profile` of all that is drawn in replays
     looks: Mapping[str, style.Look] = field(default_factory=dict)  # if not by `style.look`
-    links: Sequence[Neighbour] = ()  # to other pages, `links.neighbours`
+    links: Sequence[Neighbour] = ()  # to other pages, `neighbours`
     footer: str = ""  # the last sentence; the default names the command
 
 
@@ -174,3 +221,18 @@ def run_section(about: Mapping[str, Any]) -> Section:
     facts = {key: str(value) for key, value in facts.items() if value != ""}
     frame = pd.DataFrame({"": list(facts.values())}, index=list(facts), dtype=object)
     return Section("This run", "command, machine, versions", [Table(frame, css="text plain")], True)
+
+
+Said = tuple[str, Sequence[str]]
+"""A sentence of the check, and the lines of the file and the exercise's formula behind it."""
+
+
+def sourced(sentence: str, lines: Sequence[str]) -> Markup:
+    small = Markup("<br><small>{} <code>{}</code></small>")
+    return Markup("").join([sentence, *(small.format(*line.split(": ", 1)) for line in lines)])
+
+
+def with_lines(says: Sequence[str], shown: Sequence[Sequence[str]]) -> list[Said]:
+    """Each sentence with its lines; a sentence that is no fault has none."""
+    none: list[Sequence[str]] = [[]] * len(says)
+    return list(zip(says, [*shown, *none]))

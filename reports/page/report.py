@@ -20,9 +20,17 @@ from crosscheck2d.adapters.engine import Unsupported
 from crosscheck2d.adapters.engines import OWN
 from crosscheck2d.adapters.snippets import write_snippet
 from crosscheck2d.reports.page import findings, kit, style
-from crosscheck2d.reports.page.kit import Part, Section, Table, TableCell, Text
-from crosscheck2d.reports.page.links import neighbours
-from crosscheck2d.reports.page.own_solvers import Said, sourced, with_lines
+from crosscheck2d.reports.page.kit import (
+    Part,
+    Said,
+    Section,
+    Table,
+    TableCell,
+    Text,
+    neighbours,
+    sourced,
+    with_lines,
+)
 from crosscheck2d.reports.page.scene_map import map_section, numbers, remarks, replays, title_of
 from crosscheck2d.reports.page.scenes import is_library, label, long_label
 from crosscheck2d.reports.page.summary import Summary, error_text, run_times, step_text, summarize
@@ -154,14 +162,13 @@ def report_page(
     table = Table(
         pd.DataFrame({"": list(COMMANDS.values())}, commands, dtype=object), css="plain text"
     )
-    runs = [run for scene in summary.scenes for run in scene.comparison.runs if run.versions]
-    versions = {run.engine: ", ".join(map(" ".join, run.versions.items())) for run in runs}
+    versions = [f"{k}: {', '.join(map(' '.join, v.items()))}" for k, v in summary.versions.items()]
     sections += [
         settings_section(summary),
         conformance_section(conformance),
         Section("Your solver, your scene", "commands", [table], folded=True, id="commands"),
         trust_section(summary, known_answers),
-        kit.run_section({**about, "engines": [f"{name}: {of}" for name, of in versions.items()]}),
+        kit.run_section({**about, "engines": versions}),
     ]
     return kit.render_page(
         kit.Page(

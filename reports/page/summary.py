@@ -4,7 +4,7 @@ and the sentences above it."""
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -22,10 +22,13 @@ from crosscheck2d.reports.page.scenes import (
     ANGLE,
     ERROR,
     EXACT,
+    FRICTION,
     LIBRARIES,
     LOST,
     OURS,
     RIGHT,
+    SITUATIONS,
+    SPIN,
     TIE,
     WITH_FRICTION,
     SceneScores,
@@ -34,7 +37,6 @@ from crosscheck2d.reports.page.scenes import (
     scenes_of,
     smooth,
 )
-from crosscheck2d.reports.page.situations import FRICTION, SITUATIONS, SPIN
 from crosscheck2d.reports.run.timing import Noise
 from crosscheck2d.reports.run.timing_pass import BUSY
 from crosscheck2d.reports.terminal.counts import counted, listed
@@ -124,6 +126,11 @@ class Summary:
             if nearer < farther:
                 chosen[library] = Choice(names[0], farther, nearer)
         return chosen
+
+    @cached_property
+    def versions(self) -> dict[str, Mapping[str, str]]:
+        runs = [run for scene in self.scenes for run in scene.comparison.runs if run.versions]
+        return {run.engine: run.versions for run in runs}
 
     @cached_property
     def libraries(self) -> list[str]:
@@ -251,25 +258,18 @@ class Summary:
         if name in self.libraries and profile != "matched":
             about += f", {profile}"
         title = label(name)
-        runs = [run for scene in self.scenes[:1] for run in scene.comparison.runs if run.versions]
-        versions = {run.engine: next(iter(run.versions.values())) for run in runs}
-        if is_library(name) and engine in versions and not title[-1:].isdigit():
-            title += " " + ".".join(versions[engine].split(".")[:2])
+        if is_library(name) and engine in self.versions and not title[-1:].isdigit():
+            title += " " + ".".join(next(iter(self.versions[engine].values())).split(".")[:2])
         link = f"#settings_{engine}" if name in self.libraries else ""
         return TableCell(title, name, link, notes=(TableCell(about, css="soft"),))
 
     def section(self) -> Section:
         kinds = [kind for kind in MEANING if kind in self.situations]
-        cells = {
-            k: [self.cell(name, kind) for kind in kinds] for k, name in enumerate(self.columns)
-        }
-        index = [
-            TableCell(
-                kind, css="last" * (kind == WITHOUT), notes=(TableCell(MEANING[kind], css="soft"),)
-            )
-            for kind in kinds
-        ]
-        frame = pd.DataFrame(cells, index, dtype=object)
+        rows = [[self.cell(name, kind) for name in self.columns] for kind in kinds]
+        about = {kind: (TableCell(MEANING[kind], css="soft"),) for kind in kinds}
+        last = {WITHOUT: "last"}
+        index = [TableCell(kind, css=last.get(kind, ""), notes=about[kind]) for kind in kinds]
+        frame = pd.DataFrame(rows, index, dtype=object)
         frame = frame.set_axis([self.heading(name) for name in self.columns], axis="columns")
         steps = Counter(step_text(scene.comparison.middle_dt) for scene in self.scenes)
         step = steps.most_common(1)[0][0] + (" in most scenes" if len(steps) > 1 else "")

@@ -11,10 +11,18 @@ import numpy as np
 import pandas as pd
 
 from crosscheck2d.adapters.mechanisms.table import NAMES
-from crosscheck2d.reports.compare.order import ELSEWHERE, UNSTEADY
-from crosscheck2d.reports.compare.pareto import ACCURACIES, YARDSTICK, front, said_of_cheaper
-from crosscheck2d.reports.compare.pooling import WHO, said_of_pool, without_idle
-from crosscheck2d.reports.page import situations, style
+from crosscheck2d.reports.compare.accuracy import (
+    ACCURACIES,
+    ELSEWHERE,
+    UNSTEADY,
+    WHO,
+    YARDSTICK,
+    front,
+    said_of_cheaper,
+    said_of_pool,
+    without_idle,
+)
+from crosscheck2d.reports.page import style
 from crosscheck2d.reports.page.drawing import Line, draw_lines, new_figure, svg_of
 from crosscheck2d.reports.page.kit import (
     Chart,
@@ -24,10 +32,11 @@ from crosscheck2d.reports.page.kit import (
     Table,
     TableCell,
     Text,
+    neighbours,
     render_page,
     run_section,
 )
-from crosscheck2d.reports.page.links import neighbours
+from crosscheck2d.reports.page.scenes import SITUATIONS, situations_of
 from crosscheck2d.reports.page.style import number
 from crosscheck2d.reports.run.scenes import open_scene
 from crosscheck2d.reports.speed import tables
@@ -162,13 +171,13 @@ def situation_section(results: Results) -> list[Section]:
     of_scene = {}
     for scene in results.plan.scenes:
         if (name := open_scene(scene, seed).name) in results.asks:
-            of_scene[name] = situations.situations_of(*scored(scene, seed))
+            of_scene[name] = situations_of(*scored(scene, seed))
     sizes = points.groupby("scenario").step_size.unique()
     middle = points.scenario.map({scene: sorted(k)[len(k) // 2] for scene, k in sizes.items()})
     here = points[points.step_size == middle].assign(situation=points.scenario.map(of_scene))
     here = here.assign(name=names_of(here)).explode("situation")
     medians = here.groupby(["situation", "name"], sort=False)[["error", "cost"]].median()
-    titles = [t for t in situations.SITUATIONS if t in set(here.situation)]
+    titles = [t for t in SITUATIONS if t in set(here.situation)]
     names = list(dict.fromkeys(here.name))
     rows = {}
     for title in titles:
@@ -183,9 +192,7 @@ def situation_section(results: Results) -> list[Section]:
             for name in names
         ]
     frame = pd.DataFrame(rows, index=names, dtype=object).T
-    frame.index = [
-        TableCell(title, notes=(TableCell(situations.SITUATIONS[title]),)) for title in titles
-    ]
+    frame.index = [TableCell(title, notes=(TableCell(SITUATIONS[title]),)) for title in titles]
     says = (
         "The median, over the scenes of a situation, of the largest position error in radii, at the"
         " middle of the step sizes measured, and of the cost. The report judges all scenes, at"

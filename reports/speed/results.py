@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from crosscheck2d.reports.compare.pooling import pooled
+from crosscheck2d.reports.compare.accuracy import pooled
 from crosscheck2d.reports.run.scenes import open_scene
 from crosscheck2d.reports.run.timing import Noise, noise_of
 from crosscheck2d.reports.speed import budget, tables

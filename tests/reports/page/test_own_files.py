@@ -12,7 +12,7 @@ from playwright.sync_api import Browser
 from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.compare.comparison import compare
 from crosscheck2d.reports.page.findings import early_ends, not_counted, refusals
-from crosscheck2d.reports.page.own_solvers import with_lines
+from crosscheck2d.reports.page.kit import with_lines
 from crosscheck2d.scenarios.catalogue import scenario
 from tests.reports.page.browsing import overhang
 

@@ -13,8 +13,8 @@ from crosscheck2d.adapters.play import play
 from crosscheck2d.reports.compare.comparison import Comparison, compare
 from crosscheck2d.reports.page.findings import ranked
 from crosscheck2d.reports.page.scene_map import map_section
-from crosscheck2d.reports.page.scenes import ANGLE, scenes_of
-from crosscheck2d.reports.page.situations import (
+from crosscheck2d.reports.page.scenes import (
+    ANGLE,
     CROWDS,
     FLIGHT,
     FRICTION,
@@ -22,6 +22,7 @@ from crosscheck2d.reports.page.situations import (
     SINGLE,
     SPIN,
     STACKS,
+    scenes_of,
     situations_of,
 )
 from crosscheck2d.reports.page.summary import WITHOUT, RunTimes, Summary, run_times, summarize
