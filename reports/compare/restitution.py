@@ -135,7 +135,8 @@ class Pairs(NamedTuple):
 
     def moves(self, scene: Scene) -> np.ndarray:
         """(m, 2) whether each side is a disk that moves."""
-        return ~scene.static[self.disks] & np.stack([self.j == self.j, self.j >= 0], axis=1)
+        is_disk = np.stack([self.i >= 0, self.j >= 0], axis=1)
+        return np.asarray(~scene.static[self.disks] & is_disk)
 
 
 def in_intervals(every: Pairs, samples: int, n: int) -> np.ndarray:

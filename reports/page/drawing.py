@@ -103,6 +103,8 @@ def draw_lines(
         loc="center left",
         bbox_to_anchor=(1.0, 0.5),
         frameon=False,
+        handlelength=1.3,
+        handletextpad=0.5,
     )
     for text, (line, _) in zip(legend.get_texts(), named):
         text.set(text=line.label, color=line.look.light, fontweight="bold")
