@@ -163,7 +163,7 @@ class Judge:
         self.reach = 2 * np.maximum(np.append(moved, moved[-1]), np.append(moved[0], moved))
         # (k - 1, n), where a disk is set onto the opposite edge
         half = np.array([np.inf, np.inf]) if wrap is None else (wrap[1] - wrap[0]) / 2
-        self.jumps = (np.abs(way) > half).any(axis=2)
+        self.jumps = np.asarray((np.abs(way) > half).any(axis=2))
 
     @cached_property
     def pairs(self) -> list[Pair]:

@@ -18,7 +18,6 @@ from crosscheck2d.reports.page import style
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.lines import Line2D
 
 INK, SOFT, RULE, PAPER = "#16191d", "#57626e", "#dfe3e0", "#fefefe"
 VARIABLES = {SOFT: "--soft", RULE: "--line", PAPER: "--page"}
@@ -106,11 +105,11 @@ def draw_lines(
         handlelength=1.3,
         handletextpad=0.5,
     )
-    for text, (line, _) in zip(legend.get_texts(), named):
-        text.set(text=line.label, color=line.look.light, fontweight="bold")
+    for name, (line, _) in zip(legend.get_texts(), named):
+        name.set(text=line.label, color=line.look.light, fontweight="bold")
 
 
-def draw_line(axes: Axes, line: Line) -> Line2D:
+def draw_line(axes: Axes, line: Line) -> Any:
     look = line.look
     x, y = (np.asarray(values, float) for values in (line.x, line.y))
     finite = np.isfinite(x) & np.isfinite(y)
