@@ -297,7 +297,8 @@ def test_a_law_is_computed_once_for_the_same_objects_and_again_for_a_copy():
 
 def test_what_was_found_is_forgotten_with_the_first_object():
     law = cached(lambda one, other: one.position + other.position)
-    one, other = (scenario(name).scene for name in ("near_miss", "oblique_e1"))
+    # copies: the catalogue keeps its own
+    one, other = (replace(scenario(name).scene) for name in ("near_miss", "oblique_e1"))
     law(one, other)
     kept = weakref.ref(other)
 
