@@ -274,8 +274,17 @@ def check(
         ),
     ] = None,
     outs: Annotated[
-        list[Path] | None, path_option("--out", help="Where the --format goes.  [default: printed]")
+        list[Path] | None,
+        path_option(
+            "--out",
+            help=(
+                "Where the --format goes.  [default: printed]  Without a --format, of a class: the"
+                " folder for its marks and its page. What was checked there before is not checked"
+                " again."
+            ),
+        ),
     ] = None,
+    fresh: Fresh = False,
     points: Annotated[
         Path | None,
         Option(
@@ -343,8 +352,10 @@ def check(
 
         write_scaffold(scaffold, path, points, hints)
         return
+    folder = outs.pop() if outs and len(outs) == 1 and not formats and path.is_dir() else None
     outputs = outputs_of(as_json, junit, formats or [], outs or [])
-    check_and_say(path, page, outputs, grading, Asking(seed, packages or (), unprotected))
+    asking = Asking(seed, packages or (), unprotected, folder, fresh)
+    check_and_say(path, page, outputs, grading, asking)
 
 
 @app.command()
