@@ -175,7 +175,7 @@ def carry_out(plan: RunPlan, means: Means, store: Store, progress: Progress) -> 
     header = header_of(plan, [task for task in tasks if task.kind != ANSWER], sources)
     before = store.rows.get("run", "plan")
     store.put("run", "plan", header | {"seconds": nan})
-    store.rows.delete("run", "comparisons")  # those of an earlier plan
+    store.rows.delete("run", "table")  # that of an earlier plan
     done = run_tasks(plan, means, store, tasks, scenarios, sources, progress)
     seconds = progress.seconds
     if before is not None and not done and not isnan(before.value["seconds"]):
