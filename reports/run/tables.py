@@ -112,7 +112,11 @@ def compare_scenes(results: RunResults, say: Callable[[str], None]) -> dict[str,
     with closing(run_all(answers, cores, timeout)) as ended:
         for scene, result in ended:
             say(f"answered: {sources[scene].name}")
-            comparing.store_answer(store, comparing.answer_key(sources[scene]), result, timeout)
+            key, values = (
+                comparing.answer_key(sources[scene]),
+                comparing.answer_row(result, timeout),
+            )
+            store.put(ANSWER, key, *values)
     tasks = {
         scene: comparing.compare_task(store, sources[scene], records)
         for scene, records in results.by_scene.items()

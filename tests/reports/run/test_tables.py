@@ -14,7 +14,7 @@ import pytest
 
 from crosscheck2d.reports.run import cells, comparing
 from crosscheck2d.reports.run.cells import JUDGE_SOURCE, ROOT, SOURCES
-from crosscheck2d.reports.run.comparing import ANSWER, COMPARED, CompareTask, store_answer
+from crosscheck2d.reports.run.comparing import ANSWER, COMPARED, CompareTask, answer_row
 from crosscheck2d.reports.run.pool import Failure
 from crosscheck2d.reports.run.results import COMMAND, RunResults
 from crosscheck2d.reports.run.store import Store, reading, writing
@@ -138,7 +138,7 @@ def test_an_answer_that_took_too_long_is_computed_again_only_with_more_time(stor
     results = RunResults.read(store)
     source = results.sources["slow_collision"]
     late = Failure("timeout", "stopped after 5 s")
-    store_answer(store, comparing.answer_key(source), late, 5.0)
+    store.put(ANSWER, comparing.answer_key(source), *answer_row(late, 5.0))
     for record in results.records:
         record["timeout_s"] = 5.0
     without = make_tables(results, silent)
