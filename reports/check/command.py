@@ -124,6 +124,7 @@ def check(
         check_into(None, path, page, outputs, grading, asking)
     if asking.folder.resolve().is_relative_to(path.resolve()):
         refuse(f"--out {asking.folder}: is in the class; name a folder elsewhere")
+    files_of(path)  # which refuses what is no class, before a folder is made
     with opening(asking.folder, COMMAND, asking.fresh) as store, keeping(store.folder, kept):
         check_into(store, path, page, outputs, grading, asking)
 

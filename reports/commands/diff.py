@@ -166,7 +166,7 @@ def difference(before: Path, after: Path) -> Difference:
         ]
         for changes in (numbers, statuses)
     )
-    busy = [run for run in runs if run.timings and is_busy(run)]
+    busy = [run for run in runs if run.times and is_busy(run)]
     warnings = warnings_of(runs, cells, edited) + [
         f"{run.folder}: its times are not compared: two timings of the same engine"
         f" differ by a factor of {1 + noise_floor(run).floor:.2f}"
@@ -324,8 +324,7 @@ def timings_of(first: RunResults, second: RunResults, both: pd.DataFrame) -> dic
     ratios: dict[str, list[float]] = {}
     least: dict[str, list[float]] = {}
     for row in both[both.scene_hash == both.scene_hash_after].to_dict("records"):
-        was = first.timings.get(row["cell"], {}).get(0)
-        now = second.timings.get(row["cell_after"], {}).get(0)
+        was, now = first.times.get(row["cell"]), second.times.get(row["cell_after"])
         if was is None or now is None or was["timed_s"] != now["timed_s"]:
             continue
         rounds = [*zip(was["cost"], now["cost"])]

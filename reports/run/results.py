@@ -42,7 +42,8 @@ class RunResults:
         conformance: `engine:profile` -> the findings of the probes.
         known_answers: the reproduced known answers.
         checked: solver's file, `PATH:own` -> the verdict of `crosscheck check`.
-        timing: the timing pass: its `taken` date, and its `lines`; empty if there is none.
+        timing: the timing pass: its `taken` date, and what `time_cells` returns; empty if there is
+            none.
         complete: whether everything requested has ended.
     """
 
@@ -102,23 +103,11 @@ class RunResults:
             for scene, source in self.header["sources"].items()
         }
 
-    @cached_property
-    def timings(self) -> dict[str, dict[int, dict[str, Any]]]:
-        """Key of a cell -> number of the timing (0; also 1 if timed twice) -> its line."""
-        timings: dict[str, dict[int, dict[str, Any]]] = {}
-        for line in self.timing.get("lines", []):
-            if "timing" in line:
-                timings.setdefault(line["timing"], {})[line["copy"]] = line
-        return timings
-
-    @cached_property
-    def overheads(self) -> dict[tuple[str, str, str], list[float]]:
-        """(what, `engine:profile`, scenario or "") -> s in each round, see stepping.py."""
-        return {
-            (line["overhead"], line["of"], line["scenario"]): line["cost"]
-            for line in self.timing.get("lines", [])
-            if "overhead" in line
-        }
+    @property
+    def times(self) -> dict[str, dict[str, Any]]:
+        """Key of a cell that was timed -> its times, see `time_cells`."""
+        times: dict[str, dict[str, Any]] = self.timing.get("cells", {})
+        return times
 
     def trajectory(self, record: Mapping[str, Any]) -> Trajectory | None:
         file = file_of(self.store, dict(record))

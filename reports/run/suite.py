@@ -371,7 +371,7 @@ def take_timings(
                 progress.done("timing", result.status, result.reason)
             elif result:
                 taken = datetime.now(UTC).isoformat(timespec="milliseconds")
-                store.put("timing", key, {"taken": taken, "lines": result})
+                store.put("timing", key, {"taken": taken} | result)
                 progress.done("timing")
             else:
                 progress.done("timing", "timeout", f"{seconds:g} s are not enough")

@@ -79,12 +79,11 @@ def change_cells(folder: Path, change: Callable[[dict], object]) -> None:
         store.put("run", "plan", plan)
 
 
-def change_timings(folder: Path, change: Callable[[dict], object]) -> None:
+def change_timings(folder: Path, change: Callable[[dict[str, dict]], object]) -> None:
     with writing(folder, COMMAND) as store:
         key = store.get("run", "plan").value["timing"]
         timing = store.get("timing", key).value
-        for line in timing["lines"]:
-            change(line)
+        change(timing["cells"])
         store.put("timing", key, timing)
 
 
@@ -253,9 +252,9 @@ def test_an_edited_scene_is_named_and_nothing_in_it_is_called_worse_or_better(
         if cell["cell"] in theirs:
             cell.update(scene_hash="0" * 16, cell=cell["cell"][::-1], status="unsupported")
 
-    def renamed(line: dict) -> None:
-        if line.get("timing") in theirs:
-            line.update(timing=line["timing"][::-1])
+    def renamed(cells: dict[str, dict]) -> None:
+        for key in theirs:
+            cells[key[::-1]] = cells.pop(key)
 
     change_cells(after, edited)
     change_timings(after, renamed)
@@ -308,9 +307,11 @@ def test_cells_that_only_one_run_has_are_named_and_not_worse(
 
 
 def rounds_of(costs: list[float], again: float = 1.0) -> Callable[[dict], None]:
-    def change(line: dict) -> None:
-        if "timing" in line:
-            line["cost"] = [cost * (again if line["copy"] else 1.0) for cost in costs]
+    def change(cells: dict[str, dict]) -> None:
+        for times in cells.values():
+            times["cost"] = costs
+            if "again" in times:
+                times["again"] = [cost * again for cost in costs]
 
     return change
 
