@@ -40,13 +40,6 @@ def place(text: str) -> Path:
 path_option = partial(Option, metavar="PATH", parser=place)
 path_argument = partial(Argument, parser=place)
 AsJson = Annotated[bool, Option("--json", help="Print JSON.")]
-Scenes = Annotated[
-    list[str] | None,
-    Argument(
-        metavar="SCENARIO|FILE.toml",
-        help="Scenes: names of crosscheck list, or files. Default: all scenarios.",
-    ),
-]
 Engines = Annotated[
     list[str] | None,
     Option(
@@ -56,21 +49,7 @@ Engines = Annotated[
         " own. Repeatable.",
     ),
 ]
-Dts = Annotated[
-    list[float] | None,
-    Option(
-        "--dt", metavar="S", help="Play this step size instead of those of the scene. Repeatable."
-    ),
-]
-Full = Annotated[bool, Option("--full", help="Add two finer step sizes to every scene.")]
 Seed = Annotated[int, Option(min=0, metavar="N", help="Seed of random scenes.")]
-Out = Annotated[
-    Path,
-    Option(
-        metavar="DIR",
-        help="Folder for the results. What was played there before is not played again.",
-    ),
-]
 Results = Annotated[
     Path,
     Option(
@@ -98,28 +77,6 @@ Timeout = Annotated[
         ),
     ),
 ]
-Memory = Annotated[
-    int,
-    Option(
-        min=0,
-        max=10**9,
-        metavar="MB",
-        help="Memory limit of a process; 0: an equal share of the machine's memory.",
-    ),
-]
-Scheduler = Annotated[
-    str, Option(metavar="tcp://...", help="Play on the workers of this dask scheduler.")
-]
-Timings = Annotated[
-    float,
-    Option(
-        min=0,
-        max=3600,
-        metavar="SECONDS",
-        help="Time limit of the timing pass after the run; it doubles with JavaScript engines."
-        " 0: no timing pass.",
-    ),
-]
 Port = Annotated[
     int,
     Option(
@@ -141,34 +98,60 @@ def as_typed() -> str:
 def default(context: typer.Context) -> None:
     """Without a command: all scenes through all engines, to reports/out/latest/."""
     if context.invoked_subcommand is None:
-        run()
+        app(["run"])
 
 
 @app.command()
 def run(
-    scenes: Scenes = None,
+    scenes: list[str] | None = Argument(
+        None,
+        metavar="SCENARIO|FILE.toml",
+        help="Scenes: names of crosscheck list, or files. Default: all scenarios.",
+    ),
     engine: Engines = None,
-    dt: Dts = None,
-    full: Full = False,
+    dt: list[float] | None = Option(
+        None,
+        "--dt",
+        metavar="S",
+        help="Play this step size instead of those of the scene. Repeatable.",
+    ),
+    full: bool = Option(False, "--full", help="Add two finer step sizes to every scene."),
     seed: Seed = 0,
-    out: Out = DEFAULT_OUT,
-    timings: Timings = 12.0,
+    out: Path = Option(
+        DEFAULT_OUT,
+        metavar="DIR",
+        help="Folder for the results. What was played there before is not played again.",
+    ),
+    timings: float = Option(
+        12.0,
+        min=0,
+        max=3600,
+        metavar="SECONDS",
+        help="Time limit of the timing pass after the run; it doubles with JavaScript engines."
+        " 0: no timing pass.",
+    ),
     workers: Workers = 0,
     timeout: Timeout = 60.0,
-    memory: Memory = 0,
-    scheduler: Scheduler = "",
+    memory: int = Option(
+        0,
+        min=0,
+        max=10**9,
+        metavar="MB",
+        help="Memory limit of a process; 0: an equal share of the machine's memory.",
+    ),
+    scheduler: str = Option(
+        "", metavar="tcp://...", help="Play on the workers of this dask scheduler."
+    ),
     fresh: Fresh = False,
-    trajectories: Annotated[
-        bool, Option("--trajectories", help="Write the trajectory of each cell as an .npz, too.")
-    ] = False,
-    bits: Annotated[
-        bool,
-        Option(
-            "--bits",
-            help="Write hashes of all results at the middle step size to bits.csv, and compare them"
-            " with those kept in reports/bits.csv. Exit status 1: an engine has other bits.",
-        ),
-    ] = False,
+    trajectories: bool = Option(
+        False, "--trajectories", help="Write the trajectory of each cell as an .npz, too."
+    ),
+    bits: bool = Option(
+        False,
+        "--bits",
+        help="Write hashes of all results at the middle step size to bits.csv, and compare them"
+        " with those kept in reports/bits.csv. Exit status 1: an engine has other bits.",
+    ),
 ) -> None:
     """Play scenes through engines, and write the report."""
     from crosscheck2d.reports.commands.run import means_of, run_plan
@@ -180,13 +163,14 @@ def run(
 
 @app.command()
 def report(
-    out: Annotated[Path, Argument(metavar="OUT", help="The folder of a run, finished or not.")],
-    timings: Annotated[
-        float | None,
-        Option(
-            min=0.1, max=3600, metavar="SECONDS", help="Time the engines again, in so many seconds."
-        ),
-    ] = None,
+    out: Path = Argument(..., metavar="OUT", help="The folder of a run, finished or not."),
+    timings: float | None = Option(
+        None,
+        min=0.1,
+        max=3600,
+        metavar="SECONDS",
+        help="Time the engines again, in so many seconds.",
+    ),
 ) -> None:
     """Write the tables and the page of a run again.
 
@@ -200,8 +184,8 @@ def report(
 
 @app.command()
 def diff(
-    before: Annotated[Path, Argument(metavar="OUT_A", help="The folder of a run.")],
-    after: Annotated[Path, Argument(metavar="OUT_B", help="The folder of a later one.")],
+    before: Path = Argument(..., metavar="OUT_A", help="The folder of a run."),
+    after: Path = Argument(..., metavar="OUT_B", help="The folder of a later one."),
 ) -> None:
     """Show what changed between two runs.
 
@@ -216,13 +200,12 @@ def diff(
 @app.command()
 def truth(
     scene: OneScene,
-    events: Annotated[
-        bool, Option("--events", help="Print all collisions, not only the first and last ten.")
-    ] = False,
-    at: Annotated[
-        float | None,
-        Option(metavar="SECONDS", help="Print where each disk is then, and how it moves."),
-    ] = None,
+    events: bool = Option(
+        False, "--events", help="Print all collisions, not only the first and last ten."
+    ),
+    at: float | None = Option(
+        None, metavar="SECONDS", help="Print where each disk is then, and how it moves."
+    ),
     as_json: AsJson = False,
     seed: Seed = 0,
     timeout: Timeout = 60.0,
@@ -240,92 +223,67 @@ def truth(
 
 @app.command()
 def check(
-    path: Annotated[
-        Path,
-        path_argument(
-            metavar="FILE|DIR",
-            help="An Exercise.js, a solver.py, or a folder of them, one for each student.",
-        ),
-    ],
-    as_json: Annotated[
-        bool, Option("--json", help="Print every question and its answer as JSON.")
-    ] = False,
-    junit: Annotated[
-        Path | None, path_option(help="Write every question as a JUnit test, too.")
-    ] = None,
-    page: Annotated[
-        Path | None,
-        path_option(
-            help=(
-                "Where to write the page of the file, or of the class.  [default: check.html for a"
-                " file, none for a class]"
-            )
-        ),
-    ] = None,
-    formats: Annotated[
-        list[str] | None,
-        Option(
-            "--format",
-            metavar="NAME",
-            help=(
-                "Write the marks as table, json, junit, gradescope or csv. Repeatable, each with"
-                " its --out."
-            ),
-        ),
-    ] = None,
-    outs: Annotated[
-        list[Path] | None, path_option("--out", help="Where the --format goes.  [default: printed]")
-    ] = None,
-    points: Annotated[
-        Path | None,
-        Option(
-            metavar="TASKS.toml",
-            parser=place,
-            help="File with the points of each task or question.  [default: 20 in all]",
-        ),
-    ] = None,
-    id_pattern: Annotated[
-        str,
-        Option(
-            metavar="REGEX",
-            help=(
-                "Pattern of the student's id in the path: the match, or its first group."
-                "  [default: name of the folder or file]"
-            ),
-        ),
-    ] = "",
-    hints: Annotated[
-        str,
-        Option(
-            metavar="full|low",
-            help="Whether marks of a student name likely causes, or only wrong answers.",
-        ),
-    ] = "full",
-    scaffold: Annotated[
-        str, Option(metavar="gradescope", help="Write an autograder to DIR, and check nothing.")
-    ] = "",
-    seed: Annotated[
-        int | None,
-        Option(
-            metavar="N",
-            min=0,
-            help="Numbers of the questions.  [default: 0 for a file, random for a class]",
-        ),
-    ] = None,
-    packages: Annotated[
-        list[str] | None,
-        Option(
-            "--package",
-            metavar="NAME",
-            help="An installed package that a solver.py may import beside numpy. Repeatable.",
-        ),
-    ] = None,
-    unprotected: Annotated[
-        bool,
-        Option(
-            "--unprotected", help="Check a folder with Python files even where no sandbox works."
-        ),
-    ] = False,
+    path: Path = path_argument(
+        ...,
+        metavar="FILE|DIR",
+        help="An Exercise.js, a solver.py, or a folder of them, one for each student.",
+    ),
+    as_json: bool = Option(False, "--json", help="Print every question and its answer as JSON."),
+    junit: Path | None = path_option(None, help="Write every question as a JUnit test, too."),
+    page: Path | None = path_option(
+        None,
+        help="Where to write the page of the file, or of the class.  [default: check.html for a"
+        " file, none for a class]",
+    ),
+    formats: list[str] | None = Option(
+        None,
+        "--format",
+        metavar="NAME",
+        help="Write the marks as table, json, junit, gradescope or csv. Repeatable, each with"
+        " its --out.",
+    ),
+    outs: list[Path] | None = path_option(
+        None,
+        "--out",
+        help="Where the --format goes.  [default: printed]  Without a --format, of a class: the"
+        " folder for its marks and its page. What was checked there before is not checked"
+        " again.",
+    ),
+    fresh: Fresh = False,
+    points: Path | None = path_option(
+        None,
+        metavar="TASKS.toml",
+        help="File with the points of each task or question.  [default: 20 in all]",
+    ),
+    id_pattern: str = Option(
+        "",
+        metavar="REGEX",
+        help="Pattern of the student's id in the path: the match, or its first group."
+        "  [default: name of the folder or file]",
+    ),
+    hints: str = Option(
+        "full",
+        metavar="full|low",
+        help="Whether marks of a student name likely causes, or only wrong answers.",
+    ),
+    scaffold: str = Option(
+        "", metavar="gradescope", help="Write an autograder to DIR, and check nothing."
+    ),
+    seed: int | None = Option(
+        None,
+        metavar="N",
+        min=0,
+        help="Numbers of the questions.  [default: 0 for a file, random for a class]",
+    ),
+    packages: list[str] | None = Option(
+        None,
+        "--package",
+        metavar="NAME",
+        help="An installed package that a solver.py may import beside numpy. Repeatable.",
+    ),
+    unprotected: bool = Option(
+        False, "--unprotected", help="Check a folder with Python files even where no sandbox works."
+    ),
 ) -> None:
     """Check a hand-written solver of the exercise.
 
@@ -343,15 +301,17 @@ def check(
 
         write_scaffold(scaffold, path, points, hints)
         return
+    folder = outs.pop() if outs and len(outs) == 1 and not formats and path.is_dir() else None
     outputs = outputs_of(as_json, junit, formats or [], outs or [])
-    check_and_say(path, page, outputs, grading, Asking(seed, packages or (), unprotected))
+    asking = Asking(seed, packages or (), unprotected, folder, fresh)
+    check_and_say(path, page, outputs, grading, asking)
 
 
 @app.command()
 def play(
-    flight: Annotated[
-        Path | None, path_argument(metavar="FLIGHT.toml", help="A saved flight to fly again.")
-    ] = None,
+    flight: Path | None = path_argument(
+        None, metavar="FLIGHT.toml", help="A saved flight to fly again."
+    ),
     engine: Engines = None,
     port: Port = 8000,
     opens: Opens = False,
@@ -367,18 +327,14 @@ def play(
 
 @app.command()
 def lesson(
-    name: Annotated[
-        str,
-        Argument(metavar="NAME", help="A lesson, by name or number. Default: the list of them."),
-    ] = "",
+    name: str = Argument(
+        "", metavar="NAME", help="A lesson, by name or number. Default: the list of them."
+    ),
     port: Port = 8000,
     opens: Opens = False,
-    export: Annotated[
-        Path | None,
-        path_option(
-            help="Write lesson NAME to a file, or all lessons to a folder, to open offline."
-        ),
-    ] = None,
+    export: Path | None = path_option(
+        None, help="Write lesson NAME to a file, or all lessons to a folder, to open offline."
+    ),
 ) -> None:
     """Show why engines differ, in lessons with sliders.
 
@@ -401,23 +357,18 @@ def lesson(
 
 @app.command()
 def speed(
-    scenes: Annotated[
-        list[str] | None,
-        Argument(
-            metavar="SCENARIO|FILE.toml",
-            help=(
-                "Scenes: names of crosscheck list, or files. Default: one of each kind, or with"
-                " --full all."
-            ),
-        ),
-    ] = None,
+    scenes: list[str] | None = Argument(
+        None,
+        metavar="SCENARIO|FILE.toml",
+        help="Scenes: names of crosscheck list, or files. Default: one of each kind, or with"
+        " --full all.",
+    ),
     engine: Engines = None,
-    full: Annotated[
-        bool,
-        Option(
-            "--full", help="Measure all scenarios, finer steps, more rounds, up to 100 000 disks."
-        ),
-    ] = False,
+    full: bool = Option(
+        False,
+        "--full",
+        help="Measure all scenarios, finer steps, more rounds, up to 100 000 disks.",
+    ),
     fresh: Fresh = False,
     seed: Seed = 0,
     out: Results = Path("reports/out/speed"),
@@ -434,17 +385,13 @@ def speed(
 @app.command()
 def advise(
     scene: OneScene,
-    error: Annotated[
-        str, Option(metavar="E", help="The largest error allowed: 1% or 0.01.")
-    ] = "1%",
-    purpose: Annotated[
-        str,
-        Option(
-            "--for",
-            metavar="PURPOSE",
-            help="What the error is of: trajectory, energy or statistics.",
-        ),
-    ] = "trajectory",
+    error: str = Option("1%", metavar="E", help="The largest error allowed: 1% or 0.01."),
+    purpose: str = Option(
+        "trajectory",
+        "--for",
+        metavar="PURPOSE",
+        help="What the error is of: trajectory, energy or statistics.",
+    ),
     engine: Engines = None,
     seed: Seed = 0,
     as_json: AsJson = False,
@@ -460,25 +407,20 @@ def advise(
 
 @app.command()
 def stability(
-    cases: Annotated[
-        list[str] | None,
-        Argument(
-            metavar="CASE|FILE.toml",
-            help="Cases: rows of limits.csv, or scene files. Default: all cases.",
-        ),
-    ] = None,
-    vary: Annotated[
-        list[str] | None,
-        Option(
-            metavar="WHAT",
-            help=f"What to vary in FILE.toml: {VARIED}. Repeatable. Default: each of them.",
-        ),
-    ] = None,
+    cases: list[str] | None = Argument(
+        None,
+        metavar="CASE|FILE.toml",
+        help="Cases: rows of limits.csv, or scene files. Default: all cases.",
+    ),
+    vary: list[str] | None = Option(
+        None,
+        metavar="WHAT",
+        help=f"What to vary in FILE.toml: {VARIED}. Repeatable. Default: each of them.",
+    ),
     engine: Engines = None,
-    full: Annotated[
-        bool,
-        Option("--full", help="Play all runs at more values, to brackets of 1 % instead of 5 %."),
-    ] = False,
+    full: bool = Option(
+        False, "--full", help="Play all runs at more values, to brackets of 1 % instead of 5 %."
+    ),
     fresh: Fresh = False,
     out: Results = Path("reports/out/stability"),
     workers: Workers = 0,
@@ -495,13 +437,11 @@ def stability(
 
 @app.command()
 def tune(
-    engine: Annotated[
-        list[str] | None,
-        Argument(
-            metavar="ENGINE",
-            help="Engines to search. Default: all with settings to search that need no --extra.",
-        ),
-    ] = None,
+    engine: list[str] | None = Argument(
+        None,
+        metavar="ENGINE",
+        help="Engines to search. Default: all with settings to search that need no --extra.",
+    ),
     fresh: Fresh = False,
     out: Results = Path("reports/out/tune"),
 ) -> None:
@@ -516,66 +456,51 @@ def tune(
 
 @app.command(name="new-engine")
 def new_engine(
-    name: Annotated[
-        Path,
-        path_argument(
-            metavar="NAME", help="The file to write: NAME.js in JavaScript, NAME.py in Python."
-        ),
-    ],
-    source: Annotated[
-        Path | None,
-        Option(
-            "--from",
-            metavar="FILE",
-            parser=place,
-            help="Your ball code, which is copied into it. The other options say what it is like.",
-        ),
-    ] = None,
-    fields: Annotated[
-        str | None,
-        Option(
-            metavar="NAMES",
-            help='Of a ball: x, y, vx, vy, radius, mass, as "x y dx dy r m" or "pos.x ...".',
-        ),
-    ] = None,
-    move: Annotated[
-        str | None,
-        Option(
-            metavar="CALL",
-            help="Moves a ball: NAME, .METHOD or a call with ball, dt, width, height.",
-        ),
-    ] = None,
-    collide: Annotated[
-        str | None,
-        Option(metavar="CALL", help="Collides two balls: NAME, .METHOD or a call with a and b."),
-    ] = None,
-    step: Annotated[
-        str | None,
-        Option(metavar="CALL", help="Moves and collides all balls: NAME or a call with dt."),
-    ] = None,
-    ball: Annotated[
-        str | None,
-        Option(
-            metavar="EXPRESSION", help='Makes a ball from x, y, vx, vy, r, m: "new Ball(x, y, r)".'
-        ),
-    ] = None,
-    balls: Annotated[
-        str | None, Option(metavar="NAME", help="The list of all balls, if --step uses one.")
-    ] = None,
-    box: Annotated[
-        str | None, Option(metavar="NAMES", help='Width and height of its box: "canvas.width H".')
-    ] = None,
-    gravity: Annotated[
-        str | None, Option(metavar="NAME", help="Its gravity, positive if down.")
-    ] = None,
-    restitution: Annotated[
-        str | None, Option(metavar="NAME|NUMBER", help="Its restitution. Default: 1.")
-    ] = None,
-    per_frame: Annotated[
-        float | None, Option(metavar="N", help="Its speeds are per frame, with N frames a second.")
-    ] = None,
-    pixels: Annotated[float | None, Option(metavar="N", help="Its pixels in 1 m.")] = None,
-    y_down: Annotated[bool, Option("--y-down", help="Its y points down.")] = False,
+    name: Path = path_argument(
+        ..., metavar="NAME", help="The file to write: NAME.js in JavaScript, NAME.py in Python."
+    ),
+    source: Path | None = path_option(
+        None,
+        "--from",
+        metavar="FILE",
+        help="Your ball code, which is copied into it. The other options say what it is like.",
+    ),
+    fields: str | None = Option(
+        None,
+        metavar="NAMES",
+        help='Of a ball: x, y, vx, vy, radius, mass, as "x y dx dy r m" or "pos.x ...".',
+    ),
+    move: str | None = Option(
+        None,
+        metavar="CALL",
+        help="Moves a ball: NAME, .METHOD or a call with ball, dt, width, height.",
+    ),
+    collide: str | None = Option(
+        None, metavar="CALL", help="Collides two balls: NAME, .METHOD or a call with a and b."
+    ),
+    step: str | None = Option(
+        None, metavar="CALL", help="Moves and collides all balls: NAME or a call with dt."
+    ),
+    ball: str | None = Option(
+        None,
+        metavar="EXPRESSION",
+        help='Makes a ball from x, y, vx, vy, r, m: "new Ball(x, y, r)".',
+    ),
+    balls: str | None = Option(
+        None, metavar="NAME", help="The list of all balls, if --step uses one."
+    ),
+    box: str | None = Option(
+        None, metavar="NAMES", help='Width and height of its box: "canvas.width H".'
+    ),
+    gravity: str | None = Option(None, metavar="NAME", help="Its gravity, positive if down."),
+    restitution: str | None = Option(
+        None, metavar="NAME|NUMBER", help="Its restitution. Default: 1."
+    ),
+    per_frame: float | None = Option(
+        None, metavar="N", help="Its speeds are per frame, with N frames a second."
+    ),
+    pixels: float | None = Option(None, metavar="N", help="Its pixels in 1 m."),
+    y_down: bool = Option(False, "--y-down", help="Its y points down."),
 ) -> None:
     """Write an engine to begin with, in a file of your own.
 
@@ -592,9 +517,9 @@ def new_engine(
 
 @app.command(name="new-solver")
 def new_solver(
-    name: Annotated[
-        Path, path_argument(metavar="NAME", help="The file to write: Exercise.js or solver.py.")
-    ],
+    name: Path = path_argument(
+        ..., metavar="NAME", help="The file to write: Exercise.js or solver.py."
+    ),
 ) -> None:
     """Write the two functions of the exercise, to be filled in."""
     from crosscheck2d.reports.commands.new_engine import write_solver
@@ -604,10 +529,9 @@ def new_solver(
 
 @app.command(name="list")
 def list_(
-    what: Annotated[
-        str,
-        Argument(metavar="engines|scenarios|metrics|verdicts|cases|lessons", help="Default: all."),
-    ] = "",
+    what: str = Argument(
+        "", metavar="engines|scenarios|metrics|verdicts|cases|lessons", help="Default: all."
+    ),
 ) -> None:
     """List engines, scenarios, metrics, verdicts, cases and lessons, and say what each is."""
     from crosscheck2d.reports.commands.listing import explain

@@ -11,11 +11,12 @@ import sys
 from collections import Counter
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from contextlib import closing
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import partial
+from importlib.metadata import packages_distributions, version
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
 from unicodedata import combining, normalize
 
 from crosscheck2d.adapters.host.file import (
@@ -38,10 +39,21 @@ from crosscheck2d.reports.check.points import DEFAULT, BadPoints, Points, read_p
 from crosscheck2d.reports.check.rows import CheckRow
 from crosscheck2d.reports.check.terminal import print_scene, print_total, sentence_on
 from crosscheck2d.reports.check.verdict import FileCheck, check_file, named, nothing_in
+from crosscheck2d.reports.run.arguments import opening
+from crosscheck2d.reports.run.cells import CHECK_SOURCE, content_key, source_hash
 from crosscheck2d.reports.run.made import may_overwrite
 from crosscheck2d.reports.run.pool import Failure, run_all
+from crosscheck2d.reports.run.store import Store
 from crosscheck2d.reports.terminal.counts import counted
-from crosscheck2d.reports.terminal.exits import BAD_INPUT, DONE, FAILED, FolderTaken, refuse, say
+from crosscheck2d.reports.terminal.exits import (
+    BAD_INPUT,
+    DONE,
+    FAILED,
+    FolderTaken,
+    keeping,
+    refuse,
+    say,
+)
 from crosscheck2d.reports.terminal.foreign_text import put_text
 from crosscheck2d.reports.terminal.progress import Progress
 
@@ -51,6 +63,7 @@ if TYPE_CHECKING:
 # Only pages written by this command start with this; they may be overwritten.
 PAGE = b'<meta name="generator" content="crosscheck check">'
 CHECKING = 600.0  # s that a file may take: more than the sum of the limits of its calls
+COMMAND, MARKS, CLASS_PAGE = "crosscheck check", "marks.csv", "class.html"
 # prefixes of files and folders that no student wrote
 NOBODYS = (".", "__", "node_modules")
 
@@ -87,11 +100,15 @@ class Asking(NamedTuple):
         seed: of the numbers of the questions; None: 0 for a file, a random one for a class.
         packages: what a solver.py may import beside numpy.
         unprotected: check a folder with Python files even where nothing protects the machine.
+        folder: of the results of a class, each of which is kept as it ends; None: none are kept.
+        fresh: whether those that it has are ignored.
     """
 
     seed: int | None = None
     packages: Sequence[str] = ()
     unprotected: bool = False
+    folder: Path | None = None
+    fresh: bool = False
 
 
 def check(
@@ -100,9 +117,30 @@ def check(
     outputs: Sequence[Output],
     grading: Grading,
     asking: Asking = Asking(),  # noqa: B008 - a tuple
-) -> None:
+) -> NoReturn:
     """Check the file or folder `path` and print the result; exits 0, 1 (a fault was found) or 2
     (nothing to check)."""
+    if asking.folder is None:
+        check_into(None, path, page, outputs, grading, asking)
+    if asking.folder.resolve().is_relative_to(path.resolve()):
+        refuse(f"--out {asking.folder}: is in the class; name a folder elsewhere")
+    files_of(path)  # which refuses what is no class, before a folder is made
+    with opening(asking.folder, COMMAND, asking.fresh) as store, keeping(store.folder, kept):
+        check_into(store, path, page, outputs, grading, asking)
+
+
+def kept() -> str:
+    return "What was checked is kept; the same command goes on."
+
+
+def check_into(
+    store: Store | None,
+    path: Path,
+    page: Path | None,
+    outputs: Sequence[Output],
+    grading: Grading,
+    asking: Asking,
+) -> NoReturn:
     single = any(FORMATS[one.format].single for one in outputs)
     files = submission_of(path) if single else files_of(path)
     several = path.is_dir() and not single
@@ -110,11 +148,9 @@ def check(
         page = Path("check.html")
     places_for(page, outputs)
     say_protection(files, several, asking)
-    seed = asking.seed
-    if seed is None:
-        seed = secrets.randbelow(10**6) + 1 if several else 0
+    seed = seed_of(asking.seed, several, store)
     homes = {file: path if single else student_of(file, path) for file in files}
-    checks = checked(files, seed, asking.packages, homes if several else {})
+    checks = checked(files, seed, asking.packages, homes if several else {}, store)
     if not path.is_dir() and checks[0].refused and not single:
         refuse([checks[0].refused])
     if single and files[0].is_dir() and len(solvers_below(path)) > 1:
@@ -141,7 +177,25 @@ def check(
         if scenes and not several and not printed:
             print_scene(scenes, page)
         make_page(page, marked, several)
+    if store is not None:
+        from crosscheck2d.reports.check.class_page import write_class_page
+
+        store.export(MARKS, FORMATS["csv"].text(marked))
+        with store.exporting(CLASS_PAGE) as part:
+            write_class_page(part, marked)
+        say(f"{store.folder / MARKS}\n{store.folder / CLASS_PAGE}")
     sys.exit(DONE if all(one.passed for one in checks) else FAILED)
+
+
+def seed_of(seed: int | None, several: bool, store: Store | None) -> int:
+    """The one that was asked for, or that of the results which are there, or a new one."""
+    if seed is None and store is not None and (row := store.get("class", "seed")):
+        seed = int(row.value)
+    if seed is None:
+        seed = secrets.randbelow(10**6) + 1 if several else 0
+    if store is not None:
+        store.put("class", "seed", seed)
+    return seed
 
 
 def outputs_of(
@@ -391,20 +445,38 @@ def checked(
     seed: int = 0,
     packages: Sequence[str] = (),
     homes: Mapping[Path, Path] = MappingProxyType({}),
+    store: Store | None = None,
 ) -> list[FileCheck]:
     """The checks in order, one worker per core, which can always be stopped. Files with the same
     text are judged once. Those of which the clock has ended a call are asked once more at the end,
     each alone: marks do not depend on how busy the machine is.
 
-    homes: in a class file -> its student's folder, or the file itself.
+    homes: in a class file -> its student's folder, or the file itself. store: has a row for each
+    text that was checked.
     """
     alike: dict[Hashable, list[Path]] = {}
     for file in files:
         alike.setdefault(identity_of(file, homes.get(file)), []).append(file)
     firsts = [same[0] for same in alike.values()]
-    done = ask_all(firsts, os.cpu_count() or 1, seed, packages, homes)
+    keys, done = {}, dict[Path, FileCheck]()
+    if store is not None:
+        within = packages_distributions() if packages else {}
+        installed = [version(of) for name in packages for of in within.get(name, ())]
+        asked = seed, *packages, *installed, source_hash(CHECK_SOURCE)
+        # a file that is no solver has no text by which it is known
+        keys = {
+            same[0]: content_key(text, *asked)
+            for text, same in alike.items()
+            if isinstance(text, tuple)
+        }
+        for file, key in keys.items():
+            if row := store.get("check", key):
+                done[file] = from_row(row.value, file, homes.get(file))
+    missing = [file for file in firsts if file not in done]
+    kept = store, keys
+    done |= ask_all(missing, os.cpu_count() or 1, seed, packages, homes, *kept)
     if late := [file for file in firsts if done[file].waited]:
-        done |= ask_all(late, 1, seed, packages, homes)
+        done |= ask_all(late, 1, seed, packages, homes, *kept)
     for first, *others in alike.values():
         done |= {file: named_for(file, done[first], homes.get(file)) for file in others}
     if len(files) > 1:
@@ -419,8 +491,12 @@ def ask_all(
     seed: int,
     packages: Sequence[str],
     homes: Mapping[Path, Path],
+    store: Store | None,
+    keys: Mapping[Path, str],
 ) -> dict[Path, FileCheck]:
-    """The check of each file, `workers` at once."""
+    """The check of each file, `workers` at once; those with a key become rows as they end."""
+    if not files:
+        return {}
     tasks: dict[Hashable, Any] = {
         file: partial(check_here, file, seed, tuple(packages), homes.get(file)) for file in files
     }
@@ -431,6 +507,8 @@ def ask_all(
         for key, one in results:
             file = Path(str(key))
             done[file] = not_checked(file, one) if isinstance(one, Failure) else one
+            if store is not None and file in keys and not isinstance(one, Failure):
+                store.put("check", keys[file], as_row(one))
             progress.done(f"checked {printable(str(file.relative_to(file.parent.parent)))}")
     return done
 
@@ -458,6 +536,21 @@ def named_for(file: Path, one: FileCheck, within: Path | None = None) -> FileChe
     solver = None if one.solver is None else read_solver(file, within)
     refused = one.refused.replace(printable(str(one.path)), printable(str(file)))
     return replace(one, path=file, solver=solver, refused=refused)
+
+
+def as_row(one: FileCheck) -> dict[str, Any]:
+    values = {name: getattr(one, name) for name in ("refused", "restitution", "seconds", "waited")}
+    is_solver, rows = one.solver is not None, [asdict(row) for row in one.rows]
+    return values | {"path": str(one.path), "is_solver": is_solver, "rows": rows}
+
+
+def from_row(value: Mapping[str, Any], file: Path, within: Path | None) -> FileCheck:
+    """The check that a row keeps of a file with this text."""
+    rest = dict(value)
+    path, is_solver, rows = (rest.pop(name) for name in ("path", "is_solver", "rows"))
+    solver = read_solver(file, within) if is_solver else None
+    checked_rows = [CheckRow(**row | {"lines": [*map(tuple, row["lines"])]}) for row in rows]
+    return named_for(file, FileCheck(Path(path), checked_rows, solver=solver, **rest), within)
 
 
 def not_checked(file: Path, failure: Failure) -> FileCheck:

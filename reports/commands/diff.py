@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 import sys
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -21,7 +21,6 @@ from crosscheck2d.reports.compare.verdicts import VERDICTS
 from crosscheck2d.reports.compare.view import NOT_JUDGED, rounding_of
 from crosscheck2d.reports.run.results import COMMAND, RunResults
 from crosscheck2d.reports.run.store import reading
-from crosscheck2d.reports.run.tables import joined
 from crosscheck2d.reports.run.timing_pass import is_busy, noise_floor
 from crosscheck2d.reports.terminal.console import Console, print_list, print_table
 from crosscheck2d.reports.terminal.counts import counted, listed
@@ -44,7 +43,8 @@ CONFIDENCE = 0.99
 # defined. Both are relative to a number above 1, in whatever unit.
 ROUNDINGS = 100
 ROUNDING = "differs in rounding"
-WHOSE = ["scenario", "engine", "profile", "dt_s", "metric", "versus"]
+CELL = ["scenario", "name", "dt_s"]  # the name is `engine:profile`
+WHOSE = ["scenario", "engine", "profile", "dt_s", "versus"]  # in a table
 SHOWN = 12  # changes, the worst first
 MACHINE = ("system", "architecture", "processor", "cores")
 HEADINGS = (
@@ -61,9 +61,11 @@ HEADINGS = (
 
 
 class Change(NamedTuple):
-    """A difference: the engine, what changed, its value before and after, and the verdict "better",
-    "worse", "other" or `ROUNDING`; of a number between two engines also the other one."""
+    """A difference: the scene, the engine, what changed, its value before and after, and the
+    verdict "better", "worse", "other" or `ROUNDING`; of a number between two engines also the other
+    one."""
 
+    scenario: str
     engine: str
     what: str
     before: str
@@ -72,17 +74,20 @@ class Change(NamedTuple):
     factor: float = 1.0
     beside: str = ""
 
+    @property
+    def text(self) -> str:
+        values = f"{self.before or 'nan'} → {self.after or 'nan'}"
+        return f"{self.verdict}: {self.engine}, {self.what}: {values}"
+
 
 class Timing(NamedTuple):
     """How the times of an engine changed.
 
     Attributes:
-        engine: `engine:profile`.
         factor: median over the cells of the least time after : before.
         low, high: the interval of the median of the `n` ratios, taken round by round.
     """
 
-    engine: str
     factor: float
     low: float
     high: float
@@ -94,9 +99,12 @@ class Timing(NamedTuple):
             return "worse"
         return "better" if self.high < 1 and self.factor < 1 / FACTOR else "same"
 
-
-Name = tuple[str, str, float]  # scenario, `engine:profile` as the table has it, dt in s
-Cells = dict[Name, dict[str, Any]]  # -> the line of the cell
+    @property
+    def text(self) -> str:
+        if self.high == math.inf:
+            return f"×{self.factor:.2f} (of {self.n}: too few)"
+        verdict = "" if self.verdict == "same" else f" {self.verdict}"
+        return f"×{self.factor:.2f} ({self.low:.2f}–{self.high:.2f}){verdict}"
 
 
 @dataclass(frozen=True)
@@ -109,7 +117,7 @@ class Difference:
         same: `engine:profile` -> number of values that are equal bit for bit; one between two
             engines counts for both.
         shared: the number of cells (scene, engine and step size) that both runs have.
-        timings: of the engines timed in both runs, if the machine is the same.
+        timings: `engine:profile` -> of the engines timed in both runs, if the machine is the same.
     """
 
     warnings: list[str]
@@ -117,12 +125,12 @@ class Difference:
     numbers: list[Change]
     same: Counter[str]
     shared: int
-    timings: list[Timing]
+    timings: Mapping[str, Timing]
 
     @property
     def worse(self) -> int:
         verdicts = [change.verdict for change in (*self.statuses, *self.numbers)]
-        return [*verdicts, *(timing.verdict for timing in self.timings)].count("worse")
+        return [*verdicts, *(each.verdict for each in self.timings.values())].count("worse")
 
 
 def difference(before: Path, after: Path) -> Difference:
@@ -134,68 +142,84 @@ def difference(before: Path, after: Path) -> Difference:
     with reading(before, COMMAND) as first, reading(after, COMMAND) as second:
         runs = RunResults.read(first), RunResults.read(second)
         tables = table_of(runs[0]), table_of(runs[1])
-    cells = by_name(runs[0]), by_name(runs[1])
-    both = cells[0].keys() & cells[1].keys()
+    cells = cells_of(runs[0]), cells_of(runs[1])
+    both = cells[0].merge(cells[1], on=CELL, suffixes=("", "_after"))
+    hashes = [dict(zip(run.scenario, run.scene_hash)) for run in cells]
+    edited = sorted(
+        scene
+        for scene in hashes[0].keys() & hashes[1].keys()
+        if len({h[scene] for h in hashes}) > 1
+    )
     machines = [[run.header["machine"][key] for key in MACHINE] for run in runs]
     same_machine = machines[0] == machines[1]
-    edited = edited_scenes(*cells)
-    # of these scene, settings and versions are the same
-    alike = {name for name in both if cells[0][name]["cell"] == cells[1][name]["cell"]}
-    numbers, same = changed_numbers(*tables, alike if same_machine else set())
-    played = {name for name in both if all(side[name]["status"] == "ok" for side in cells)}
-    statuses = changed_statuses(*cells) + changed_judgement(*tables, played)
+    # of cells with the same key scene, settings and versions are the same
+    equal = both[both.cell == both.cell_after] if same_machine else both[:0]
+    played = both[(both.status == "ok") & (both.status_after == "ok")]
+    numbers, same = changed_numbers(*tables, names_of(equal))
+    statuses = changed_statuses(both) + changed_judgement(*tables, names_of(played))
     numbers, statuses = (
         [
             change._replace(verdict="other")  # nothing in an edited scene is worse or better
-            if change.what.partition("  ")[0] in edited and change.verdict in ("worse", "better")
+            if change.scenario in edited and change.verdict in ("worse", "better")
             else change
             for change in changes
         ]
         for changes in (numbers, statuses)
     )
-    warnings = [*warnings_of(*runs), *warnings_on_cells(runs, cells, edited)]
-    busy = [run for run in runs if run.timings and is_busy(run)]
-    warnings += [
+    busy = [run for run in runs if run.times and is_busy(run)]
+    warnings = warnings_of(runs, cells, edited) + [
         f"{run.folder}: its times are not compared: two timings of the same engine"
         f" differ by a factor of {1 + noise_floor(run).floor:.2f}"
         for run in busy
     ]
-    timed = timings_of(*runs, *cells) if same_machine and not busy else []
-    return Difference(warnings, statuses, numbers, same, len(both), timed)
+    timings = timings_of(*runs, both) if same_machine and not busy else {}
+    return Difference(warnings, statuses, numbers, same, len(both), timings)
 
 
-def warnings_of(before: RunResults, after: RunResults) -> list[str]:
-    """What may differ beside the engines."""
-    was, now = before.header, after.header
-    warnings = [
-        f"differs in machine: {key}: {was['machine'][key]} before, {now['machine'][key]} after"
-        for key in MACHINE
-        if was["machine"][key] != now["machine"][key]
-    ]
-    for name in sorted({*was["versions"], *now["versions"]}):
-        versions = [header["versions"].get(name, "missing") for header in (was, now)]
-        if versions[0] != versions[1]:
-            warnings.append(
-                f"differs in version: {name}: {versions[0]} before, {versions[1]} after"
-            )
-    if was["seed"] != now["seed"]:
-        warnings.append(f"differs in seed: {was['seed']} before, {now['seed']} after")
-    runs = (before, after)
-    return warnings + [f"{run.folder} is not complete" for run in runs if not run.complete]
+def table_of(results: RunResults) -> pd.DataFrame:
+    """deviations.csv with all values as text: equal text means equal bits."""
+    table = pd.read_csv(BytesIO(results.table()), dtype=str, keep_default_na=False)
+    if list(table.columns) != list(COLUMNS):
+        raise Unusable(
+            f"{results.folder}: its tables are of another version; make them again: crosscheck"
+            f" report {results.folder}"
+        )
+    return table
 
 
-def warnings_on_cells(
-    runs: Sequence[RunResults], cells: Sequence[Cells], edited: Sequence[str]
+def cells_of(results: RunResults) -> pd.DataFrame:
+    """The `CELL`, status, key and scene of each cell."""
+    names = [encoded(f"{r['engine']}:{r['profile']}").decode() for r in results.records]
+    columns = ["scenario", "dt_s", "status", "cell", "scene_hash"]
+    return pd.DataFrame(results.records, columns=columns).assign(name=names)
+
+
+def names_of(cells: pd.DataFrame) -> set[tuple[str, str, float]]:
+    return set(cells[CELL].itertuples(index=False, name=None))
+
+
+def warnings_of(
+    runs: tuple[RunResults, RunResults],
+    cells: tuple[pd.DataFrame, pd.DataFrame],
+    edited: Sequence[str],
 ) -> list[str]:
-    """On the cells that only one run has, and on edited scenes."""
-    warnings = []
+    """What may differ beside the engines, and the cells that only one run has."""
+    headers = [run.header for run in runs]
+    facts = [(f"machine: {key}", [header["machine"][key] for header in headers]) for key in MACHINE]
+    for name in sorted({*headers[0]["versions"], *headers[1]["versions"]}):
+        versions = [header["versions"].get(name, "missing") for header in headers]
+        facts.append((f"version: {name}", versions))
+    facts.append(("seed", [header["seed"] for header in headers]))
+    warnings = [
+        f"differs in {what}: {was} before, {now} after" for what, (was, now) in facts if was != now
+    ]
+    warnings += [f"{run.folder} is not complete" for run in runs if not run.complete]
     for run, own, other in zip(runs, cells, reversed(cells)):
-        if rest := [name for name in own if name not in other]:
-            kinds = [dict.fromkeys(engine for _, engine, _ in rest)]
-            kinds.append(dict.fromkeys(scene for scene, _, _ in rest))
+        rest = own[~own.set_index(CELL).index.isin(other.set_index(CELL).index)]
+        if len(rest):
             engines, scenes = (
                 listed([*names[:6], *([f"{len(names) - 6} more"] if len(names) > 6 else [])])
-                for names in map(list, kinds)
+                for names in (list(rest.name.unique()), list(rest.scenario.unique()))
             )
             warnings.append(
                 f"only in {run.folder}: {counted(len(rest), 'cell')} of {engines}, in {scenes}"
@@ -208,108 +232,85 @@ def warnings_on_cells(
     return warnings
 
 
-def by_name(results: RunResults) -> Cells:
-    return {
-        (r["scenario"], encoded(f"{r['engine']}:{r['profile']}").decode(), r["dt_s"]): r
-        for r in results.records
-    }
-
-
-def edited_scenes(before: Cells, after: Cells) -> list[str]:
-    """The names that stand for another scene in each run: a file was edited, or the seed of a
-    random scene is another."""
-    hashes = [
-        {(name[0], record["scene_hash"]) for name, record in cells.items()}
-        for cells in (before, after)
-    ]
-    common = {scene for scene, _ in hashes[0]} & {scene for scene, _ in hashes[1]}
-    return sorted({scene for scene, _ in hashes[0] ^ hashes[1]} & common)
-
-
-def changed_statuses(before: Cells, after: Cells) -> list[Change]:
+def changed_statuses(both: pd.DataFrame) -> list[Change]:
     changes = []
-    for (scenario, engine, dt), cell in before.items():
-        was, now = cell["status"], after.get((scenario, engine, dt), cell)["status"]
-        if was != now:
-            verdict = "worse" if was == "ok" else "better" if now == "ok" else "other"
-            changes.append(Change(engine, f"{scenario}  dt {dt:.4g} s  status", was, now, verdict))
+    for row in both[both.status != both.status_after].to_dict("records"):
+        was, now = row["status"], row["status_after"]
+        verdict = "worse" if was == "ok" else "better" if now == "ok" else "other"
+        what = f"{row['scenario']}  dt {row['dt_s']:.4g} s  status"
+        changes.append(Change(row["scenario"], row["name"], what, was, now, verdict))
     return changes
 
 
 def changed_judgement(
-    before: pd.DataFrame, after: pd.DataFrame, played: Collection[Name]
+    before: pd.DataFrame, after: pd.DataFrame, played: Collection[tuple[str, str, float]]
 ) -> list[Change]:
     """The cells that both runs `played` but only one judged, so that only that one has numbers."""
-    reasons = [
-        {
-            ((r["scenario"], f"{r['engine']}:{r['profile']}", float(r["dt_s"])), r["versus"]): r
-            for r in table[table.metric == "status"].to_dict("records")
-        }
-        for table in (before, after)
-    ]
+    reasons = [table[table.metric == "status"][[*WHOSE, "note"]] for table in (before, after)]
+    rows = reasons[0].merge(reasons[1], on=WHOSE, how="outer", suffixes=("", "_after"))
     changes = []
-    for cell, versus in sorted(reasons[0].keys() ^ reasons[1].keys()):
-        if cell in played:
-            scenario, engine, dt = cell
-            what = f"{scenario}  dt {dt:.4g} s  against {versus}: status"
-            was, now = (of.get((cell, versus), {"note": "judged"})["note"] for of in reasons)
-            verdict = "better" if now == "judged" else "worse"
-            changes.append(Change(engine, what, was, now, verdict))
+    for row in rows[rows.note.isna() != rows.note_after.isna()].to_dict("records"):
+        scenario, name, dt = (
+            row["scenario"],
+            f"{row['engine']}:{row['profile']}",
+            float(row["dt_s"]),
+        )
+        if (scenario, name, dt) in played:
+            what = f"{scenario}  dt {dt:.4g} s  against {row['versus']}: status"
+            was, now = (
+                "judged" if pd.isna(row[key]) else row[key] for key in ("note", "note_after")
+            )
+            verdict = "worse" if was == "judged" else "better"
+            changes.append(Change(scenario, name, what, was, now, verdict))
     return changes
 
 
-def table_of(results: RunResults) -> pd.DataFrame:
-    """deviations.csv with all values as text: equal text means equal bits."""
-    table = pd.read_csv(BytesIO(joined(results.tables())), dtype=str, keep_default_na=False)
-    if list(table.columns) != list(COLUMNS):
-        raise Unusable(
-            f"{results.folder}: its tables are of another version; make them again: crosscheck"
-            f" report {results.folder}"
-        )
-    return table
-
-
 def changed_numbers(
-    before: pd.DataFrame, after: pd.DataFrame, equal: Collection[Name]
+    before: pd.DataFrame, after: pd.DataFrame, equal: Collection[tuple[str, str, float]]
 ) -> tuple[list[Change], Counter[str]]:
     """Every number that differs between the tables, and how many are equal, by engine.
 
-    The numbers of `equal` cells must have the same bits: any change is worse. Elsewhere the metric
-    says which value is better, unless they differ in rounding; a verdict that fails now, and did
-    not before, is worse. A deviation between two engines, or a number that only one run judges, is
-    then "other".
+    The numbers of `equal` cells must have the same bits: any change is worse.
     """
-    both = before.merge(after, on=WHOSE, suffixes=("", "_after"))
-    both["name"] = both.engine + ":" + both.profile
-    differs = both.value != both.value_after
+    both = before.merge(after, on=[*WHOSE, "metric"], suffixes=("", "_after"))
+    both["name"], differs = both.engine + ":" + both.profile, both.value != both.value_after
     changes = []
     for row in both[differs].to_dict("records"):
-        scenario, dt = row["scenario"], float(row["dt_s"])
+        scenario, name, dt = row["scenario"], row["name"], float(row["dt_s"])
         beside = row["versus"] if ":" in row["versus"] else ""
-        engines = [row["name"], beside] if beside else [row["name"]]
-        was, now = (float(row[key] or "nan") for key in ("value", "value_after"))
-        must = all((scenario, name, dt) in equal for name in engines)
-        first, second = (row[key] or NOT_JUDGED for key in ("value", "value_after"))
+        engines = [name, beside] if beside else [name]
         what = f"{scenario}  dt {dt:.4g} s  {row['metric']} against {row['versus']}"
-        if NOT_JUDGED in (first, second):
-            verdict = "other"
-        elif must:
-            verdict, what = "worse", f"{what} (same cell, other bits)"
-        elif is_rounding(engines, was, now):
-            verdict = ROUNDING
-        elif row["metric"] in VERDICTS:
-            fails = [
-                not value <= float(row[f"bound{end}"])
-                for value, end in ((was, ""), (now, "_after"))
-            ]
-            verdict = "other" if fails[0] == fails[1] else "worse" if fails[1] else "better"
+        was, now = (row[key] or NOT_JUDGED for key in ("value", "value_after"))
+        if NOT_JUDGED in (was, now):
+            verdict, factor = "other", math.inf
         else:
-            verdict = verdict_of(row["metric"], row["versus"], was, now)
-        factor = ratio(was, now)
-        changes.append(Change(row["name"], what, first, second, verdict, factor, beside))
+            small, large = sorted(abs(float(value)) for value in (was, now))
+            factor = large / small if small > 0 and math.isfinite(large) else math.inf
+            verdict = verdict_of(row, engines)
+            if all((scenario, engine, dt) in equal for engine in engines):
+                verdict, what = "worse", f"{what} (same cell, other bits)"
+        changes.append(Change(scenario, name, what, was, now, verdict, factor, beside))
     equal_rows = both[~differs]
     between = equal_rows.versus.str.contains(":", regex=False)
     return changes, Counter([*equal_rows.name, *equal_rows.versus[between]])
+
+
+def verdict_of(row: Mapping[Any, Any], engines: Sequence[str]) -> str:
+    """The verdict on a number of these engines whose bits differ, unless they must not.
+
+    The metric says which value is better, unless they differ in rounding; a verdict that fails now,
+    and did not before, is worse. A deviation between two engines is "other".
+    """
+    was, now, metric = float(row["value"]), float(row["value_after"]), row["metric"]
+    if is_rounding(engines, was, now):
+        return ROUNDING
+    if metric in VERDICTS:
+        failed, fails = not was <= float(row["bound"]), not now <= float(row["bound_after"])
+        return "other" if failed == fails else "worse" if fails else "better"
+    better = METRICS[metric].better if metric in METRICS else ""
+    if len(engines) > 1 or better in ("", "as stated") or abs(now) == abs(was):
+        return "other"
+    return "worse" if (now < was if better == "higher" else abs(now) > abs(was)) else "better"
 
 
 def is_rounding(engines: Sequence[str], was: float, now: float) -> bool:
@@ -319,42 +320,25 @@ def is_rounding(engines: Sequence[str], was: float, now: float) -> bool:
     return abs(now - was) <= bound * max(1.0, abs(was), abs(now))
 
 
-def verdict_of(metric: str, versus: str, was: float, now: float) -> str:
-    better = METRICS[metric].better if metric in METRICS else ""
-    if ":" in versus or better in ("", "as stated"):
-        return "other"
-    if math.isnan(was) or math.isnan(now):
-        return "worse" if math.isnan(now) else "better"
-    worse = now < was if better == "higher" else abs(now) > abs(was)
-    return "worse" if worse else "better" if abs(now) != abs(was) else "other"
-
-
-def ratio(was: float, now: float) -> float:
-    small, large = sorted((abs(was), abs(now)))
-    return large / small if small > 0 and math.isfinite(large) else math.inf
-
-
-def timings_of(one: RunResults, other: RunResults, before: Cells, after: Cells) -> list[Timing]:
+def timings_of(first: RunResults, second: RunResults, both: pd.DataFrame) -> dict[str, Timing]:
     ratios: dict[str, list[float]] = {}
     least: dict[str, list[float]] = {}
-    for name in before.keys() & after.keys():
-        was = one.timings.get(before[name]["cell"], {}).get(0)
-        now = other.timings.get(after[name]["cell"], {}).get(0)
+    for row in both[both.scene_hash == both.scene_hash_after].to_dict("records"):
+        was, now = first.times.get(row["cell"]), second.times.get(row["cell_after"])
         if was is None or now is None or was["timed_s"] != now["timed_s"]:
             continue
         rounds = [*zip(was["cost"], now["cost"])]
-        alike = before[name]["scene_hash"] == after[name]["scene_hash"]
-        if alike and rounds and min(min(rounds)) > 0:
+        if rounds and min(min(rounds)) > 0:
             fastest, then = (min(times) for times in zip(*rounds))
-            least.setdefault(name[1], []).append(then / fastest)
-            ratios.setdefault(name[1], []).extend(now / was for was, now in rounds)
-    return [
-        timing(engine, sorted(ratios[engine]), float(np.median(least[engine])))
+            least.setdefault(row["name"], []).append(then / fastest)
+            ratios.setdefault(row["name"], []).extend(now / was for was, now in rounds)
+    return {
+        engine: timing(sorted(ratios[engine]), float(np.median(least[engine])))
         for engine in sorted(ratios)
-    ]
+    }
 
 
-def timing(engine: str, ratios: list[float], factor: float) -> Timing:
+def timing(ratios: list[float], factor: float) -> Timing:
     """The distribution-free interval of the median of sorted ratios, from order statistics (the
     sign test's)."""
     n = len(ratios)
@@ -363,7 +347,7 @@ def timing(engine: str, ratios: list[float], factor: float) -> Timing:
         k += 1
         tail += math.comb(n, k) * 0.5**n
     low, high = (ratios[k - 1], ratios[n - k]) if k else (0.0, math.inf)
-    return Timing(engine, factor, low, high, n)
+    return Timing(factor, low, high, n)
 
 
 def show_difference(before: Path, after: Path) -> NoReturn:
@@ -387,47 +371,39 @@ def show_difference(before: Path, after: Path) -> NoReturn:
     title = "What changed; a number between two engines counts for both"
     print_table(console, HEADINGS, by_engine(changed), title, left=HEADINGS[-1:])
     console.print()
-    total = len(changed.statuses) + len(changed.numbers)
-    if worst := sorted((*changed.statuses, *changed.numbers), key=severity)[:SHOWN]:
-        shown = f"The {len(worst)} largest of {total} changes" if total > SHOWN else "The changes"
-        console.print(f"{shown}, before → after", style="italic", highlight=False)
-        print_list(console, map(change_text, worst))
+    changes = [*changed.statuses, *changed.numbers]
+    if worst := sorted(changes, key=severity)[:SHOWN]:
+        some = len(changes) > SHOWN
+        title = f"The {len(worst)} largest of {len(changes)} changes" if some else "The changes"
+        console.print(f"{title}, before → after", style="italic", highlight=False)
+        print_list(console, [change.text for change in worst])
         console.print()
-    console.print(summary(changed), highlight=False)
+    worse = f"{counted(changed.worse, 'result') if changed.worse else 'Nothing'} got worse."
+    times = "No times were compared: run both on one machine that is idle."
+    if changed.timings:
+        times = (
+            f"A time counts as worse if its factor is above {FACTOR:g} and its whole 99 % interval"
+            " above 1."
+        )
+    console.print(f"{worse} {times}", highlight=False)
     sys.exit(FAILED if changed.worse else DONE)
 
 
 def by_engine(changed: Difference) -> list[list[str]]:
-    timings = {timing.engine: timing for timing in changed.timings}
-    changes = *changed.statuses, *changed.numbers
+    kinds = [(changed.statuses, ["worse", "better"])]
+    kinds.append((changed.numbers, [ROUNDING, "worse", "better", "other"]))
+    changes = [change for kind, _ in kinds for change in kind]
     engines = [*changed.same, *(change.engine for change in changes)]
     engines += [change.beside for change in changes if change.beside]
     rows = []
-    for engine in dict.fromkeys((*engines, *timings)):
-        statuses, numbers = (
-            Counter(x.verdict for x in kind if engine in (x.engine, x.beside))
-            for kind in (changed.statuses, changed.numbers)
-        )
-        counts = [statuses["worse"], statuses["better"]]
-        same = str(changed.same[engine])
-        others = [numbers[verdict] for verdict in (ROUNDING, "worse", "better", "other")]
-        texts = [*(str(n or "") for n in counts), same, *(str(n or "") for n in others)]
-        rows.append([engine, *texts, time_text(timings.get(engine))])
+    for engine in dict.fromkeys((*engines, *changed.timings)):
+        texts = []
+        for kind, verdicts in kinds:
+            counts = Counter(x.verdict for x in kind if engine in (x.engine, x.beside))
+            texts += [str(counts[verdict] or "") for verdict in verdicts]
+        time = changed.timings[engine].text if engine in changed.timings else ""
+        rows.append([engine, *texts[:2], str(changed.same[engine]), *texts[2:], time])
     return rows
-
-
-def change_text(change: Change) -> str:
-    values = f"{change.before or 'nan'} → {change.after or 'nan'}"
-    return f"{change.verdict}: {change.engine}, {change.what}: {values}"
-
-
-def time_text(timing: Timing | None) -> str:
-    if timing is None:
-        return ""
-    if timing.high == math.inf:
-        return f"×{timing.factor:.2f} (of {timing.n}: too few)"
-    verdict = "" if timing.verdict == "same" else f" {timing.verdict}"
-    return f"×{timing.factor:.2f} ({timing.low:.2f}–{timing.high:.2f}){verdict}"
 
 
 def severity(change: Change) -> tuple[bool, bool, bool, float]:
@@ -437,14 +413,4 @@ def severity(change: Change) -> tuple[bool, bool, bool, float]:
         change.verdict == ROUNDING,
         not change.what.endswith("status"),
         -change.factor,
-    )
-
-
-def summary(changed: Difference) -> str:
-    said = f"{counted(changed.worse, 'result') if changed.worse else 'Nothing'} got worse."
-    if not changed.timings:
-        return f"{said} No times were compared: run both on one machine that is idle."
-    return (
-        f"{said} A time counts as worse if its factor is above {FACTOR:g} and its whole 99 %"
-        " interval above 1."
     )

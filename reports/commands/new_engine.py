@@ -24,19 +24,8 @@ crosscheck check {0}"""
 
 
 class Hints(NamedTuple):
-    """What a ball code calls its things; None where the hint was not given.
-
-    Attributes:
-        fields: of a ball: x, y, vx, vy, radius, mass; the last may be left out.
-        move, collide: the function of a ball and that of two: a name, a `.method` or a call.
-        step: the function that does all, in place of these two.
-        ball, balls: an expression that makes a ball; the list that the code's functions use.
-        box: the two variables with the size of its box, from 0.
-        gravity, restitution: variables; restitution may be a number.
-        per_frame: frames a second, if speeds are per frame.
-        pixels: of 1 m.
-        source: the file with the code.
-    """
+    """What a ball code calls its things; None where the hint was not given. The options of
+    `crosscheck new-engine` explain each, `source` is its --from."""
 
     fields: str | None = None
     move: str | None = None

@@ -14,7 +14,7 @@ import numpy as np
 
 from crosscheck2d.reports.page.style import number
 from crosscheck2d.reports.run.arguments import checked_scenes
-from crosscheck2d.reports.run.comparing import compute_record, no_answer
+from crosscheck2d.reports.run.comparing import compute_record, why_no_answer
 from crosscheck2d.reports.run.pool import Failure, run_all
 from crosscheck2d.reports.run.scenes import open_scene
 from crosscheck2d.reports.terminal.console import Console, print_table, print_texts
@@ -45,7 +45,7 @@ def show_truth(
         progress.say(f"the exact answer to {scenario.name}")
         [(_, record)] = results
     if isinstance(record, Failure):
-        reason = no_answer(record, timeout).reason
+        reason = why_no_answer(record, timeout)
     elif isinstance(record, str):
         reason = f"no exact answer: {record}"
     elif at is not None and at > record.horizon:

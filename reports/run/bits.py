@@ -9,7 +9,7 @@ import platform
 from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import pandas as pd
 
@@ -26,43 +26,19 @@ BITS = "bits.csv"  # in the folder of a run
 SHOWN = 12  # differences
 
 
-class ChangedBits(NamedTuple):
-    """A row whose bits differ from the kept ones: the last sample known to be equal, and the first
-    known to differ; both -1 if the two runs have different lengths."""
-
-    scenario: str
-    name: str
-    same: int
-    other: int
-
-    @property
-    def sentence(self) -> str:
-        where = f"the same bits up to sample {self.same}, others by sample {self.other}"
-        if self.other < 0:
-            where = "it did not play to the same sample"
-        elif self.same < 0:
-            where = "other bits from the start on"
-        return f"{self.name} in {self.scenario}: {where}"
-
-
 def rows_of(results: RunResults) -> list[dict[str, Any]]:
     """A row of the table for each scene and engine of a run, at the middle of the step sizes; none
     for another seed than that of the kept bits, 0, which gives random scenes other starts."""
-    steps: dict[str, set[int]] = {}
+    rows = []
     for record in results.records:
-        steps.setdefault(record["scene"], set()).add(record["substeps"])
-    middle = {scene: sorted(sizes)[len(sizes) // 2] for scene, sizes in steps.items()}
-    order = [list(results.header[name]) for name in ("scenes", "engines")]
-    rows = {}
-    for record in results.records:
-        if record["seed"] == 0 and record["substeps"] == middle[record["scene"]]:
-            name = f"{record['engine']}:{record['profile']}"
+        substeps = results.sources[record["scene"]].substeps
+        if record["seed"] == 0 and record["substeps"] == substeps[len(substeps) // 2]:
             trajectory = results.trajectory(record)
             bits = ("", "") if trajectory is None else bits_of(trajectory)
-            what = [record[key] for key in ("scenario", "engine", "profile")]
+            what = [record[key] for key in COLUMNS[:3]]
             row = (*what, f"{record['dt_s']:.9g}", record["status"], *bits)
-            rows[order[0].index(record["scene"]), order[1].index(name)] = dict(zip(COLUMNS, row))
-    return [rows[place] for place in sorted(rows)]
+            rows.append(dict(zip(COLUMNS, row)))
+    return rows
 
 
 def bits_of(played: Trajectory) -> tuple[str, str]:
@@ -89,17 +65,12 @@ def read(text: str) -> pd.DataFrame:
     return pd.read_csv(io.StringIO("\n".join(lines)), dtype=str, keep_default_na=False)
 
 
-def differences(kept: pd.DataFrame, now: pd.DataFrame) -> tuple[list[ChangedBits], pd.DataFrame]:
+def differences(kept: pd.DataFrame, now: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """The rows that both tables have, with the `name` of the engine, and those of them whose bits
+    differ."""
     both = kept.merge(now, on=COLUMNS[:4], suffixes=("_kept", "_now"))
-    changed = [
-        ChangedBits(
-            row["scenario"],
-            f"{row['engine']}:{row['profile']}",
-            *first_other(row["until_kept"], row["until_now"]),
-        )
-        for row in both[both.bits_kept != both.bits_now].to_dict("records")
-    ]
-    return changed, both
+    both["name"] = both.engine + ":" + both.profile
+    return both, both[both.bits_kept != both.bits_now]
 
 
 def first_other(one: str, other: str) -> tuple[int, int]:
@@ -108,10 +79,22 @@ def first_other(one: str, other: str) -> tuple[int, int]:
     pairs = list(zip(one.split(), other.split()))
     if not pairs or len(one.split()) != len(other.split()):
         return -1, -1
-    at = next(k for k, (mine, theirs) in enumerate(pairs) if mine != theirs)
+    at = next(k for k, (kept, now) in enumerate(pairs) if kept != now)
     # the hashes are those of samples 0, 1, 2, 4 ... and the last
     samples = [-1, 0, *(2**p for p in range(len(pairs)))]
     return samples[at], samples[at + 1]
+
+
+def sentence_on(row: Mapping[Any, Any]) -> str:
+    """What differs in a row: up to which sample the bits are known to be equal, and from which
+    known to differ."""
+    same, other = first_other(row["until_kept"], row["until_now"])
+    where = f"the same bits up to sample {same}, others by sample {other}"
+    if other < 0:
+        where = "it did not play to the same sample"
+    elif same < 0:
+        where = "other bits from the start on"
+    return f"{row['name']} in {row['scenario']}: {where}"
 
 
 def write_bits(results: RunResults) -> None:
@@ -122,26 +105,23 @@ def write_bits(results: RunResults) -> None:
 
 def kept_bits(folder: Path) -> bool:
     """Print how the bits of a run differ from the kept ones; whether there are any, and none do."""
-    kept, here = (path.read_text(encoding="utf-8") for path in (KEPT, folder / BITS))
-    table, (before, made_by) = (
-        read(here),
-        (
-            dict(line[2:].split(": ", 1) for line in text.splitlines() if line.startswith("# "))
-            for text in (kept, here)
-        ),
+    texts = [path.read_text(encoding="utf-8") for path in (KEPT, folder / BITS)]
+    kept, now = map(read, texts)
+    before, made_by = (
+        dict(line[2:].split(": ", 1) for line in text.splitlines() if line.startswith("# "))
+        for text in texts
     )
-    changed, both = differences(read(kept), table)
-    counts = Counter((both.engine + ":" + both.profile).tolist())
-    other = Counter(row.name for row in changed)
+    both, changed = differences(kept, now)
+    counts, other = Counter(both.name.tolist()), Counter(changed.name.tolist())
     rows = [[name, str(n - other[name]), str(n)] for name, n in counts.items()]
     console = Console()
     title = "In how many scenes the bits are those kept in reports/bits.csv"
     print_table(console, ["engine", "the same", "of"], rows, title)
     console.print()
-    print_list(console, [row.sentence for row in changed[:SHOWN]])
+    print_list(console, map(sentence_on, changed[:SHOWN].to_dict("records")))
     if len(changed) > SHOWN:
         console.print(f"and {counted(len(changed) - SHOWN, 'more difference')}")
-    if new := {*(table.engine + ":" + table.profile)} - {*counts}:
+    if new := {*(now.engine + ":" + now.profile)} - {*counts}:
         names = listed(sorted(new))
         console.print(f"No bits are kept of {names} in these scenes and steps.", highlight=False)
     others = [
@@ -152,4 +132,4 @@ def kept_bits(folder: Path) -> bool:
     if others:
         console.print(f"The kept bits were made with {', '.join(others)}.", highlight=False)
     console.print()
-    return not changed and not both.empty
+    return changed.empty and not both.empty

@@ -80,30 +80,25 @@ def compute_answer(source: SceneSource) -> ExactAnswer:
     return ExactAnswer(record, OK, "")
 
 
-def no_answer(failure: Failure, timeout: float) -> ExactAnswer:
-    """The answer of a worker that failed, or took longer than `timeout` s."""
-    reason = f"the exact answer could not be computed: {failure.status}: {failure.reason}"
-    if failure.status == "timeout":
-        reason = f"the exact answer took longer than {timeout:g} s (--timeout)"
-    return ExactAnswer(None, failure.status, reason)
-
-
 def answer_key(source: SceneSource) -> str:
     return digest(repr((source.digest, judge_hash())).encode())
 
 
-def store_answer(store: Store, key: str, result: ExactAnswer | Failure, timeout: float) -> Record:
-    """Write the row of an answer; one that failed for another reason than time is tried again."""
-    answer = no_answer(result, timeout) if isinstance(result, Failure) else result
-    value = {
-        "status": answer.status,
-        "reason": answer.reason,
-        "timeout_s": timeout if answer.lost else 0.0,
-        "outside": bool(answer.lost) and answer.status != "timeout",
-    }
-    blob = b"" if answer.record is None else packed(vars(answer.record))
-    store.put(ANSWER, key, value, blob)
-    return value
+def answer_row(result: ExactAnswer | Failure, timeout: float) -> tuple[Record, bytes]:
+    """The value and blob of the row of an answer; one that failed for another reason than time is
+    tried again."""
+    if isinstance(result, Failure):
+        late, reason = result.status == "timeout", why_no_answer(result, timeout)
+        row = {"status": result.status, "reason": reason, "timeout_s": timeout, "outside": not late}
+        return row, b""
+    row = {"status": result.status, "reason": result.reason, "timeout_s": 0.0, "outside": False}
+    return row, b"" if result.record is None else packed(vars(result.record))
+
+
+def why_no_answer(failure: Failure, timeout: float) -> str:
+    if failure.status == "timeout":
+        return f"the exact answer took longer than {timeout:g} s (--timeout)"
+    return f"the exact answer could not be computed: {failure.status}: {failure.reason}"
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,8 @@
 """What the rows of a run say of its present plan: the nouns from which tables and page are made.
 
 kind           key is a hash of                        value; blob
-run            "plan", "comparisons"                   the plan, with the keys of its tasks; the key
-                                                       of each scene's table
+run            "plan", "table"                         the plan, with the keys of its tasks; -,
+                                                       deviations.csv
 cell           scene, engine, step, source, versions   how it ended; its trajectory
 probes, check  engine, source, versions                findings of the probes; verdict of the check
 known_answer   its definition, source, versions        the number computed here
@@ -14,13 +14,13 @@ export         name of a file                          the digests that it may h
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from crosscheck2d.reports.run.comparing import COMPARED, file_of, run_of
+from crosscheck2d.reports.run.comparing import file_of, run_of
 from crosscheck2d.reports.run.playing import load_trajectory
 from crosscheck2d.reports.run.scenes import SceneSource
 from crosscheck2d.reports.run.store import FILE, Store
@@ -42,7 +42,8 @@ class RunResults:
         conformance: `engine:profile` -> the findings of the probes.
         known_answers: the reproduced known answers.
         checked: solver's file, `PATH:own` -> the verdict of `crosscheck check`.
-        timing: the timing pass: its `taken` date, and its `lines`; empty if there is none.
+        timing: the timing pass: its `taken` date, and what `time_cells` returns; empty if there is
+            none.
         complete: whether everything requested has ended.
     """
 
@@ -102,23 +103,11 @@ class RunResults:
             for scene, source in self.header["sources"].items()
         }
 
-    @cached_property
-    def timings(self) -> dict[str, dict[int, dict[str, Any]]]:
-        """Key of a cell -> number of the timing (0; also 1 if timed twice) -> its line."""
-        timings: dict[str, dict[int, dict[str, Any]]] = {}
-        for line in self.timing.get("lines", []):
-            if "timing" in line:
-                timings.setdefault(line["timing"], {})[line["copy"]] = line
-        return timings
-
-    @cached_property
-    def overheads(self) -> dict[tuple[str, str, str], list[float]]:
-        """(what, `engine:profile`, scenario or "") -> s in each round, see stepping.py."""
-        return {
-            (line["overhead"], line["of"], line["scenario"]): line["cost"]
-            for line in self.timing.get("lines", [])
-            if "overhead" in line
-        }
+    @property
+    def times(self) -> dict[str, dict[str, Any]]:
+        """Key of a cell that was timed -> its times, see `time_cells`."""
+        times: dict[str, dict[str, Any]] = self.timing.get("cells", {})
+        return times
 
     def trajectory(self, record: Mapping[str, Any]) -> Trajectory | None:
         file = file_of(self.store, dict(record))
@@ -127,13 +116,11 @@ class RunResults:
     def run(self, record: Mapping[str, Any], with_trajectory: bool = True) -> Any:
         return run_of(dict(record), file_of(self.store, dict(record)) if with_trajectory else b"")
 
-    def tables(self) -> Sequence[bytes]:
-        """The scene tables of deviations.csv as they were last made; raises `Unusable` if there
-        are none."""
-        keys = self.store.get("run", "comparisons")
-        rows = [self.store.get(COMPARED, key) for key in (keys.value if keys else {}).values()]
-        if keys is None or None in rows:
+    def table(self) -> bytes:
+        """deviations.csv as it was last made; raises `Unusable` if it was not."""
+        row = self.store.get("run", "table")
+        if row is None:
             raise Unusable(
                 f"{self.folder}: has no complete tables; make them: crosscheck report {self.folder}"
             )
-        return [row.blob for row in rows if row is not None]
+        return row.blob

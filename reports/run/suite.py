@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import os
 from collections import deque
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass, field, replace
 from datetime import UTC, datetime
@@ -14,7 +14,7 @@ from math import isnan, nan
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from crosscheck2d.adapters.conformance.conform import not_probed
+from crosscheck2d.adapters.conformance.conform import Finding, not_probed
 from crosscheck2d.adapters.engine_row import EngineRow
 from crosscheck2d.adapters.engines import told_apart
 from crosscheck2d.adapters.run import Run
@@ -22,7 +22,7 @@ from crosscheck2d.reports.run import cells, comparing, playing
 from crosscheck2d.reports.run.cells import Cell
 from crosscheck2d.reports.run.cluster import Cluster
 from crosscheck2d.reports.run.comparing import ANSWER, COMPARED, Record
-from crosscheck2d.reports.run.known_answers import KNOWN_ANSWERS, KNOWN_SCENE
+from crosscheck2d.reports.run.known_answers import KNOWN_ANSWERS, KNOWN_SCENE, KnownAnswer
 from crosscheck2d.reports.run.pool import TIMEOUT, Failure, run_all
 from crosscheck2d.reports.run.results import RunResults
 from crosscheck2d.reports.run.scenes import SceneSource, open_scene, with_steps
@@ -58,17 +58,23 @@ class Check(NamedTuple):
 
 
 class RunTask(NamedTuple):
-    """A task of a run: its row has the kind and the key; `what` it is of: a cell, an engine, a
-    scene or a known answer."""
+    """A task of a run, whose row has this kind and key.
+
+    Attributes:
+        name: of its engine or its scene.
+        work: what a worker does.
+        row: the value and the blob of its row, from the result or `Failure` and the time limit, s.
+        title: what progress calls it; "" if it is not counted.
+        alone: whether it needs a process of its own.
+    """
 
     kind: str
     key: str
-    what: Any
-
-    @property
-    def name(self) -> str:
-        """What it is of; the scene of a cell."""
-        return self.what.scene if isinstance(self.what, Cell) else str(self.what)
+    name: str
+    work: Callable[[], Any]
+    row: Callable[[Any, float], tuple[Record, bytes]]
+    title: str = ""
+    alone: bool = False
 
 
 @dataclass(frozen=True)
@@ -117,207 +123,64 @@ class Means:
 
 def tasks_of(
     plan: RunPlan, scenarios: Mapping[str, Scenario], sources: Mapping[str, SceneSource]
-) -> Iterator[tuple[RunTask, Callable[[], Any]]]:
-    """Each task of a plan with the picklable function that carries it out; cells in reading
-    order."""
+) -> Iterator[RunTask]:
+    """Each task of a plan; cells in reading order."""
+    work: Callable[[], Any]
     for name, row in plan.engines.items():
-        probes = RunTask("probes", cells.content_key(name, row.source), name)
-        yield probes, partial(playing.conform_here, name, row)
+        key, work = cells.content_key(name, row.source), partial(playing.conform_here, name, row)
+        to_row = partial(probes_row, name, row)
+        yield RunTask("probes", key, name, work, to_row, f"conformance of {name}")
     checker = cells.source_hash(cells.CHECK_SOURCE)
     for name, check in plan.checks.items():
-        key = cells.content_key(name, plan.engines[name].source, checker)
-        yield RunTask("check", key, name), check
-    if KNOWN_SCENE in plan.scenes:
-        for known in KNOWN_ANSWERS:
-            yield RunTask("known_answer", cells.content_key(repr(known)), known), known.reproduce
+        text = plan.engines[name].source
+        key, to_row = cells.content_key(name, text, checker), partial(check_row, text)
+        yield RunTask("check", key, name, check, to_row, f"check of {name}")
+    for known in KNOWN_ANSWERS if KNOWN_SCENE in plan.scenes else ():
+        key, to_row = cells.content_key(repr(known)), partial(known_row, known)
+        title = f"known answer: {known.column} at dt {known.dt_s:g} s"
+        yield RunTask("known_answer", key, known.column, known.reproduce, to_row, title)
     for scene, scenario in scenarios.items():
         source, question = sources[scene], replace(scenario, truth=None)  # no answer for an engine
         for name in told_apart(plan.engines, scenario.scene):
+            row = plan.engines[name]
             for cell in (Cell(scene, plan.seed, name, k) for k in scenario.substeps):
-                key = cell.key(source.digest, plan.engines[name].source)
-                task = RunTask("cell", key, cell)
-                yield task, partial(playing.play_here, cell, plan.engines[name], question)
-        answer = RunTask(ANSWER, comparing.answer_key(source), scene)
-        yield answer, partial(comparing.compute_answer, source)
+                key = cell.key(source.digest, row.source)
+                work = partial(playing.play_here, cell, row, question)
+                title = f"{scenario.name}  {name}  dt {scenario.dt(cell.substeps):.4g} s"
+                to_row = partial(cell_row, cell, scenario)
+                yield RunTask("cell", key, scene, work, to_row, title, row.leaves_state)
+        key, work = comparing.answer_key(source), partial(comparing.compute_answer, source)
+        yield RunTask(ANSWER, key, scene, work, comparing.answer_row)
 
 
-def header_of(
-    plan: RunPlan, tasks: Iterable[RunTask], sources: Mapping[str, SceneSource]
-) -> dict[str, Any]:
-    """The plan as a row, with the keys of its tasks and what makes each scenario again."""
-    lists = {name: list(getattr(plan, name)) for name in ("scenes", "engines", "dts")}
-    values = {name: getattr(plan, name) for name in ("full", "timings", "trajectories")}
-    keys: dict[str, list[tuple[str, str]]] = {}
-    for task in tasks:
-        keys.setdefault(task.kind, []).append((task.key, task.name))
-    made = {scene: source._asdict() for scene, source in sources.items()}
-    row = cells.about(plan.command, plan.seed) | lists | values
-    return row | {"tasks": keys, "sources": made, "folder": os.getcwd(), "timing": ""}
-
-
-def carry_out(plan: RunPlan, means: Means, store: Store, progress: Progress) -> None:
-    """Carry out every task of the plan that has no row, take the timings, and write all rows."""
-    scenarios = {
-        scene: with_steps(open_scene(scene, plan.seed), plan.dts, plan.full)
-        for scene in plan.scenes
-    }
-    sources = {
-        scene: SceneSource(
-            scenario.name,
-            plan.seed,
-            tuple(scenario.substeps),
-            scene_text(scenario) if scene.endswith(".toml") else "",
-            cells.scene_hash(scenario),
-        )
-        for scene, scenario in scenarios.items()
-    }
-    tasks = dict(tasks_of(plan, scenarios, sources))
-    header = header_of(plan, [task for task in tasks if task.kind != ANSWER], sources)
-    before = store.rows.get("run", "plan")
-    store.put("run", "plan", header | {"seconds": nan})
-    store.rows.delete("run", "comparisons")  # those of an earlier plan
-    done = run_tasks(plan, means, store, tasks, scenarios, sources, progress)
-    seconds = progress.seconds
-    if before is not None and not done and not isnan(before.value["seconds"]):
-        seconds = before.value["seconds"]  # of the command that played
-    store.put("run", "plan", header | {"seconds": seconds})
-    timed = cells_to_time(RunResults.read(store), plan.engines)
-    take_timings(store, timed, plan.timings, means, progress)
-
-
-def run_tasks(
-    plan: RunPlan,
-    means: Means,
-    store: Store,
-    tasks: Mapping[RunTask, Callable[[], Any]],
-    scenarios: Mapping[str, Scenario],
-    sources: Mapping[str, SceneSource],
-    progress: Progress,
-) -> int:
-    """Carry out the tasks that have no usable row, and compare each scene when its answer and all
-    its cells are there. Returns how many tasks had none, exact answers not counted."""
-    records = usable_rows(store, tasks, means.timeout)
-    missing: dict[Any, Callable[[], Any]] = {
-        task: work for task, work in tasks.items() if task.key not in records
-    }
-    scenes: dict[str, list[RunTask]] = {}
-    for task in (task for task in tasks if task.kind in ("cell", ANSWER)):
-        scenes.setdefault(task.name, []).append(task)
-    to_do = len([task for task in missing if task.kind != ANSWER])
-    progress.start(to_do, len(tasks) - len(scenes))  # answers are not counted
-    urgent: deque[Any] = deque()
-
-    def compare_if_whole(scene: str) -> None:
-        if all(task.key in records for task in scenes[scene]):
-            rows = [records[task.key] for task in scenes[scene] if task.kind == "cell"]
-            key, compare = comparing.compare_task(store, sources[scene], rows)
-            if store.get(COMPARED, key) is None:
-                urgent.append(((COMPARED, key), compare))
-
-    for scene in scenes:
-        compare_if_whole(scene)
-    alone = leaving_state(plan, missing)
-    limits = means.timeout, means.memory
-    waiting = dict.fromkeys(missing)
-    with ExitStack() as stack:
-        far = None
-        if means.scheduler:
-            far = stack.enter_context(closing(Cluster(means.scheduler, *limits, alone)))
-            here = [task for task in missing if task.kind in HERE]
-            urgent.extend((task, missing.pop(task)) for task in here)
-        results = run_all(missing, means.workers, *limits, far, alone, urgent)
-        for ended, result in stack.enter_context(closing(results)):
-            kind, key = ended[:2]
-            if kind == COMPARED:
-                if not isinstance(result, Failure):  # else the report tries again
-                    store.put(kind, key, None, result)
-                continue
-            task = ended
-            del waiting[task]
-            if task.kind == ANSWER:
-                records[task.key] = comparing.store_answer(store, task.key, result, means.timeout)
-            elif task.kind == "cell":
-                records[task.key] = store_cell(
-                    store, task, scenarios[task.name], result, means.timeout, progress
-                )
-            else:
-                store_finding(store, task, plan, result, progress)
-            if task.key in records:
-                compare_if_whole(task.name)
-            show_waiting(waiting, progress)
-    return to_do
-
-
-def usable_rows(store: Store, tasks: Iterable[RunTask], timeout: float) -> dict[str, Record]:
-    """Key -> the row of each task that need not be done again. Without the trajectories, which may
-    be more than the memory holds."""
-    rows = ((task.key, store.get(task.kind, task.key)) for task in tasks)
-    return {
-        key: row.value | {"cell": key, "digest": row.digest}
-        for key, row in rows
-        if row is not None and is_usable(row, timeout)
-    }
-
-
-def leaving_state(plan: RunPlan, tasks: Iterable[RunTask]) -> set[RunTask]:
-    """The cells of engines that leave state in their process."""
-    return {
-        task
-        for task in tasks
-        if task.kind == "cell" and plan.engines[task.what.engine].leaves_state
-    }
-
-
-def show_waiting(tasks: Collection[RunTask], progress: Progress) -> None:
-    """When every cell has ended: show for which exact answers the run still waits."""
-    if tasks and all(task.kind == ANSWER for task in tasks):
-        first, *rest = (Path(task.what).stem for task in tasks)
-        more = f" and {len(rest)} more" if rest else ""
-        progress.say(f"the exact answer to {first}{more}")
-
-
-def store_finding(
-    store: Store, task: RunTask, plan: RunPlan, result: Any, progress: Progress
-) -> None:
-    """Write the row of the probes of an engine, of a check or of a known answer."""
-    failed = isinstance(result, Failure)
-    status, reason = (result.status, result.reason) if failed else ("ok", "")
-    outside = failed and result.outside
-    value: dict[str, Any]
-    if task.kind == "probes":
-        title = f"conformance of {task.what}"
+def probes_row(
+    name: str, row: EngineRow, result: list[Finding] | Failure, _: float
+) -> tuple[Record, bytes]:
+    if isinstance(result, Failure):
         # a solver of the exercise that hangs breaks no protocol
-        how = "departs" if plan.engines[task.what].exercise else "breaks"
-        findings = [not_probed(task.what, status, reason, how)] if failed else result  # type: ignore[arg-type]
-        value = {"findings": [asdict(finding) for finding in findings]}
-    elif task.kind == "known_answer":
-        title = f"known answer: {task.what.column} at dt {task.what.dt_s:g} s"
-        value = asdict(task.what) | {"ours_J2": nan if failed else result}
-    else:
-        title = f"check of {task.what}"
-        now = not failed and result.source == plan.engines[task.what].source
-        outside, value = not now, {"passed": False, "shown": []}
-        if now:
-            value = {name: getattr(result, name) for name in ("passed", "says", "shown")}
-        elif failed:
-            value["says"] = [f"It could not be checked: {reason}"]
-        else:
-            value["says"] = ["It was saved while the run began: check it again."]
-    store.put(task.kind, task.key, value | {"outside": outside})
-    progress.done(title, status, reason)
+        how = "departs" if row.exercise else "breaks"
+        result = [not_probed(name, result.status, result.reason, how)]  # type: ignore[arg-type]
+    return {"findings": [asdict(finding) for finding in result]}, b""
 
 
-def store_cell(
-    store: Store,
-    task: RunTask,
-    scenario: Scenario,
-    result: playing.CellResult | Failure,
-    timeout: float,
-    progress: Progress,
-) -> Record:
-    """Write the row of a cell; of one whose worker died, or was stopped, with its states up to that
-    time. Returns the row with its key and digest."""
-    cell: Cell = task.what
+def check_row(source: str, result: Check | Failure, _: float) -> tuple[Record, bytes]:
+    """`source` of the file that plays."""
+    if not isinstance(result, Failure) and result.source == source:
+        return {name: getattr(result, name) for name in ("passed", "says", "shown")}, b""
+    says = "It was saved while the run began: check it again."
+    if isinstance(result, Failure):
+        says = f"It could not be checked: {result.reason}"
+    return {"passed": False, "shown": [], "says": [says], "outside": True}, b""
+
+
+def known_row(known: KnownAnswer, result: float | Failure, _: float) -> tuple[Record, bytes]:
+    return asdict(known) | {"ours_J2": nan if isinstance(result, Failure) else result}, b""
+
+
+def cell_row(
+    cell: Cell, scenario: Scenario, result: playing.CellResult | Failure, timeout: float
+) -> tuple[Record, bytes]:
+    """Of one whose worker died, or was stopped, with its states up to that time."""
     if isinstance(result, Failure):
         trajectory = playing.from_trail(result.trail, scenario)
         samples, reason = len(trajectory) if trajectory else 0, result.reason
@@ -352,9 +215,135 @@ def store_cell(
         "settings": run.settings,
         "versions": run.versions,
     }
-    row = store.put("cell", task.key, value, file)
-    progress.done(f"{run.scenario}  {cell.engine}  dt {run.dt:.4g} s", run.status, run.reason)
+    return value, file
+
+
+def store_result(
+    store: Store, task: RunTask, result: Any, timeout: float, progress: Progress
+) -> Record:
+    """Write the row of a task. Returns its value with its key and digest."""
+    failed = isinstance(result, Failure)
+    value, blob = task.row(result, timeout)
+    value.setdefault("outside", failed and result.outside)
+    row = store.put(task.kind, task.key, value, blob)
+    if task.title:
+        status, reason = (result.status, result.reason) if failed else ("ok", "")
+        progress.done(task.title, value.get("status", status), value.get("reason", reason))
     return value | {"cell": task.key, "digest": row.digest}
+
+
+def header_of(
+    plan: RunPlan, tasks: Iterable[RunTask], sources: Mapping[str, SceneSource]
+) -> dict[str, Any]:
+    """The plan as a row, with the keys of its tasks and what makes each scenario again."""
+    lists = {name: list(getattr(plan, name)) for name in ("scenes", "engines", "dts")}
+    values = {name: getattr(plan, name) for name in ("full", "timings", "trajectories")}
+    keys: dict[str, list[tuple[str, str]]] = {}
+    for task in tasks:
+        if task.kind != ANSWER:
+            keys.setdefault(task.kind, []).append((task.key, task.name))
+    made = {scene: source._asdict() for scene, source in sources.items()}
+    row = cells.about(plan.command, plan.seed) | lists | values
+    return row | {"tasks": keys, "sources": made, "folder": os.getcwd(), "timing": ""}
+
+
+def carry_out(plan: RunPlan, means: Means, store: Store, progress: Progress) -> None:
+    """Carry out every task of the plan that has no row, take the timings, and write all rows."""
+    scenarios = {
+        scene: with_steps(open_scene(scene, plan.seed), plan.dts, plan.full)
+        for scene in plan.scenes
+    }
+    sources = {
+        scene: SceneSource(
+            scenario.name,
+            plan.seed,
+            tuple(scenario.substeps),
+            scene_text(scenario) if scene.endswith(".toml") else "",
+            cells.scene_hash(scenario),
+        )
+        for scene, scenario in scenarios.items()
+    }
+    tasks = {task.key: task for task in tasks_of(plan, scenarios, sources)}
+    header = header_of(plan, tasks.values(), sources)
+    before = store.rows.get("run", "plan")
+    store.put("run", "plan", header | {"seconds": nan})
+    store.rows.delete("run", "table")  # that of an earlier plan
+    done = run_tasks(means, store, tasks, sources, progress)
+    seconds = progress.seconds
+    if before is not None and not done and not isnan(before.value["seconds"]):
+        seconds = before.value["seconds"]  # of the command that played
+    store.put("run", "plan", header | {"seconds": seconds})
+    timed = cells_to_time(RunResults.read(store), plan.engines)
+    take_timings(store, timed, plan.timings, means, progress)
+
+
+def run_tasks(
+    means: Means,
+    store: Store,
+    tasks: Mapping[str, RunTask],
+    sources: Mapping[str, SceneSource],
+    progress: Progress,
+) -> int:
+    """Carry out the tasks that have no usable row, and compare each scene when its answer and all
+    its cells are there. Returns how many tasks had none, exact answers not counted."""
+    records = usable_rows(store, tasks.values(), means.timeout)
+    waiting = {key: task for key, task in tasks.items() if key not in records}
+    missing: dict[Any, Callable[[], Any]] = {key: task.work for key, task in waiting.items()}
+    alone = {key for key, task in waiting.items() if task.alone}
+    scenes: dict[str, list[RunTask]] = {}
+    for task in tasks.values():
+        if task.kind in ("cell", ANSWER):
+            scenes.setdefault(task.name, []).append(task)
+    to_do = [task for task in waiting.values() if task.title]  # without the answers
+    progress.start(len(to_do), len(tasks) - len(scenes))
+    urgent: deque[Any] = deque()
+
+    def compare_if_whole(scene: str) -> None:
+        if all(task.key in records for task in scenes[scene]):
+            rows = [records[task.key] for task in scenes[scene] if task.kind == "cell"]
+            key, compare = comparing.compare_task(store, sources[scene], rows)
+            if store.get(COMPARED, key) is None:
+                urgent.append((key, compare))
+
+    for scene in scenes:
+        compare_if_whole(scene)
+    limits = means.timeout, means.memory
+    with ExitStack() as stack:
+        far = None
+        if means.scheduler:
+            far = stack.enter_context(closing(Cluster(means.scheduler, *limits, alone)))
+            here = [key for key, task in waiting.items() if task.kind in HERE]
+            urgent.extend((key, missing.pop(key)) for key in here)
+        results = run_all(missing, means.workers, *limits, far, alone, urgent)
+        for key, result in stack.enter_context(closing(results)):
+            if key not in tasks:
+                if not isinstance(result, Failure):  # else the report tries again
+                    store.put(COMPARED, key, None, result)
+                continue
+            task = waiting.pop(key)
+            records[key] = store_result(store, task, result, means.timeout, progress)
+            if task.kind in ("cell", ANSWER):
+                compare_if_whole(task.name)
+            if all(task.kind == ANSWER for task in waiting.values()):
+                show_waiting([*waiting.values()], progress)
+    return len(to_do)
+
+
+def usable_rows(store: Store, tasks: Iterable[RunTask], timeout: float) -> dict[str, Record]:
+    """Key -> the row of each task that need not be done again. Without the trajectories, which may
+    be more than the memory holds."""
+    rows = ((task.key, store.get(task.kind, task.key)) for task in tasks)
+    return {
+        key: row.value | {"cell": key, "digest": row.digest}
+        for key, row in rows
+        if row is not None and is_usable(row, timeout)
+    }
+
+
+def show_waiting(answers: Sequence[RunTask], progress: Progress) -> None:
+    if answers:
+        more = f" and {len(answers) - 1} more" if answers[1:] else ""
+        progress.say(f"the exact answer to {Path(answers[0].name).stem}{more}")
 
 
 def take_timings(
@@ -382,7 +371,7 @@ def take_timings(
                 progress.done("timing", result.status, result.reason)
             elif result:
                 taken = datetime.now(UTC).isoformat(timespec="milliseconds")
-                store.put("timing", key, {"taken": taken, "lines": result})
+                store.put("timing", key, {"taken": taken} | result)
                 progress.done("timing")
             else:
                 progress.done("timing", "timeout", f"{seconds:g} s are not enough")

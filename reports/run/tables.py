@@ -26,11 +26,9 @@ from crosscheck2d.scenarios.no_truth import answered
 
 
 class ComparedScene(NamedTuple):
-    """The exact answer to a scene; the key of its table, which is its part of deviations.csv; the
-    table, or why it could not be made."""
+    """The exact answer to a scene; its part of deviations.csv, or why it could not be made."""
 
     answer: comparing.ExactAnswer
-    key: str
     table: bytes | Failure
 
 
@@ -67,8 +65,8 @@ def make_tables(results: RunResults, say: Callable[[str], None]) -> Tables:
             )
     scenes = compare_scenes(results, say)
     say("writing the tables")
-    store, parts, keys, unjudged = results.store, list[bytes](), dict[str, str](), dict[str, str]()
-    for scene, (answer, key, table) in scenes.items():
+    store, parts, unjudged = results.store, list[bytes](), dict[str, str]()
+    for scene, (answer, table) in scenes.items():
         name = results.sources[scene].name
         if answer.lost:
             unjudged[name] = answer.lost
@@ -76,10 +74,10 @@ def make_tables(results: RunResults, say: Callable[[str], None]) -> Tables:
             unjudged[name] = not_compared(table)
             parts.append(comparing.csv_of(not_judged(results, scene, table).table))
         else:
-            keys[scene] = key
             parts.append(table)
-    store.put("run", "comparisons", keys)
-    store.export("deviations.csv", joined(parts))
+    table = joined(parts)
+    store.put("run", "table", None, table)
+    store.export("deviations.csv", table)
     runs = table_of_runs(results.records)
     store.export("runs.csv", runs.to_csv(index=False))
     timed = timings(results)
@@ -114,7 +112,11 @@ def compare_scenes(results: RunResults, say: Callable[[str], None]) -> dict[str,
     with closing(run_all(answers, cores, timeout)) as ended:
         for scene, result in ended:
             say(f"answered: {sources[scene].name}")
-            comparing.store_answer(store, comparing.answer_key(sources[scene]), result, timeout)
+            key, values = (
+                comparing.answer_key(sources[scene]),
+                comparing.answer_row(result, timeout),
+            )
+            store.put(ANSWER, key, *values)
     tasks = {
         scene: comparing.compare_task(store, sources[scene], records)
         for scene, records in results.by_scene.items()
@@ -132,10 +134,7 @@ def compare_scenes(results: RunResults, say: Callable[[str], None]) -> dict[str,
             tables[scene] = result
             if not isinstance(result, Failure):
                 store.put(COMPARED, tasks[scene][0], None, result)
-    return {
-        scene: ComparedScene(task.answer, key, tables[scene])
-        for scene, (key, task) in tasks.items()
-    }
+    return {scene: ComparedScene(task.answer, tables[scene]) for scene, (_, task) in tasks.items()}
 
 
 def not_compared(failure: Failure) -> str:
@@ -157,7 +156,7 @@ def comparisons_of(results: RunResults, tables: Tables) -> list[Comparison]:
     no others are drawn."""
     comparisons = []
     for scene, records in results.by_scene.items():
-        answer, _, compared = tables.scenes[scene]
+        answer, compared = tables.scenes[scene]
         if isinstance(compared, Failure):
             comparisons.append(not_judged(results, scene, compared))
             continue

@@ -111,47 +111,53 @@ def timed_scenes(played: Sequence[str]) -> list[str]:
     return [*known, *(scene for scene in played if scene not in SCENES)][: len(SCENES)]
 
 
-def time_cells(cells: Sequence[CellToTime], seconds: float, seed: int) -> list[dict[str, Any]]:
-    """In a worker: time these cells, and the overhead of their engines, within `seconds`. A
-    line for each thing timed; none if not even the warm-up fits into the time.
+def time_cells(cells: Sequence[CellToTime], seconds: float, seed: int) -> dict[str, Any]:
+    """In a worker: time these cells, and the overhead of their engines, within `seconds`; {} if not
+    even the warm-up fits into the time.
 
-    Cells at the middle step size of a scene are timed twice, which gives the noise floor. A
-    slow cell is not timed again: its time as played is an upper bound, because collisions were
-    recorded.
+    cells: key of a cell -> `timed_s`, its `cost` and `wrapping` in each round in s per simulated
+    second; of those at the middle step size of a scene also the cost when timed `again`, which
+    gives the noise floor. overheads: `overhead_key` -> s in each round, see stepping.py. A slow
+    cell is not timed again: its time as played is an upper bound, because collisions were recorded.
     """
     allow(seconds + STARTING)
     started = perf_counter()
-    what, slow = [], []
+    what, slow = [], {}
+    parts = {cell.key: cell.part for cell in cells}
     for cell in cells:
-        part = cell.part
-        if cell.seconds * part.duration / cell.scenario.duration > SLOW:
-            cost, until = [cell.seconds / cell.scenario.duration], cell.scenario.duration
-            slow.append(line_of(("timing", cell.key, 0, until), cost, [0.0]))
+        part, duration = parts[cell.key], cell.scenario.duration
+        if cell.seconds * part.duration / duration > SLOW:
+            cost = [cell.seconds / duration]
+            slow[cell.key] = {"timed_s": duration, "cost": cost, "wrapping": [0.0]}
             continue
         run = partial(step_through, cell.row.make, part, cell.substeps)
         for copy in range(1 + (cell.substeps == cell.scenario.middle_substeps)):
-            key = ("timing", cell.key, copy, part.duration)
-            what.append(Timed(key, run, part.duration))
+            what.append(Timed((cell.key, copy), run, part.duration))
     what += overheads_of(cells)
     left = seconds - (perf_counter() - started)  # importing the engines counts, too
     rounds: dict[Any, list[Sample]] = {}
     for sample in interleaved(what, ROUNDS, SHARE, seed, left):
         rounds.setdefault(sample.key, []).append(sample)
-    lines = []
+    timed: dict[str, dict[str, Any]] = {}
+    overheads = {}
     for key, samples in rounds.items():
         # without the warm-up; with it if there are no others
         counted = [sample for sample in samples if sample.round != WARM_UP] or samples
-        costs = [sample.cost for sample in counted]
-        lines.append(line_of(key, costs, [sample.wrapping for sample in counted]))
-    return [*lines, *slow] if lines else []
+        cost = [sample.cost for sample in counted]
+        if isinstance(key, str):
+            overheads[key] = cost
+            continue
+        cell, copy = key
+        times = timed.setdefault(cell, {"timed_s": parts[cell].duration})
+        if copy:
+            times["again"] = cost
+        else:
+            times |= {"cost": cost, "wrapping": [sample.wrapping for sample in counted]}
+    return {"cells": timed | slow, "overheads": overheads} if rounds else {}
 
 
-def line_of(key: tuple[Any, ...], cost: list[float], wrapping: list[float]) -> dict[str, Any]:
-    if key[0] == "timing":
-        _, cell, copy, until = key
-        return {"timing": cell, "copy": copy, "timed_s": until, "cost": cost, "wrapping": wrapping}
-    _, what, name, scene = key
-    return {"overhead": what, "of": name, "scenario": scene, "cost": cost}
+def overhead_key(what: str, name: str, scenario: str) -> str:
+    return f"{what} of {name}" + f" in {scenario}" * (what == READ)  # which depends on the scene
 
 
 def overheads_of(cells: Sequence[CellToTime]) -> list[Timed]:
@@ -159,8 +165,7 @@ def overheads_of(cells: Sequence[CellToTime]) -> list[Timed]:
     timed: dict[Any, Timed] = {}
     for cell in cells:
         for what, run, amount in overheads(cell.row.make, cell.scenario):
-            # Only a read-out depends on the scene.
-            key = ("overhead", what, cell.name, cell.scenario.name if what == READ else "")
+            key = overhead_key(what, cell.name, cell.scenario.name)
             timed.setdefault(key, Timed(key, run, amount))
     return [one for one in timed.values() if can(one)]
 
@@ -180,12 +185,10 @@ def timings(results: RunResults) -> pd.DataFrame:
     rows: list[tuple[Any, ...]] = []
     scenarios: dict[str, Scenario] = {}
     for record in results.records:
-        lines = results.timings.get(record["cell"], {})
-        if 0 not in lines:
+        times, name = results.times.get(record["cell"]), f"{record['engine']}:{record['profile']}"
+        if times is None:
             continue
-        line, name = lines[0], f"{record['engine']}:{record['profile']}"
-        low, cost, high = np.percentile(line["cost"], [25, 50, 75])
-        again = lines.get(1, {}).get("cost", [np.nan])
+        low, cost, high = np.percentile(times["cost"], [25, 50, 75])
         scene = record["scene"]
         scenario = scenarios[scene] = scenarios.get(scene) or results.sources[scene].scenario()
         rows.append(
@@ -194,13 +197,13 @@ def timings(results: RunResults) -> pd.DataFrame:
                 record["engine"],
                 record["profile"],
                 record["dt_s"],
-                line["timed_s"],
-                len(line["cost"]),
+                times["timed_s"],
+                len(times["cost"]),
                 *(1e6 * value for value in (cost, low, high)),
                 1e6 * binding(results, name, scenario, record["substeps"]),
-                1e6 * median_of(results.overheads.get((READ, name, scenario.name))),
-                1e6 * float(np.median(line["wrapping"])),
-                1e6 * float(np.median(again)),
+                1e6 * overhead(results, READ, name, scenario.name),
+                1e6 * float(np.median(times["wrapping"])),
+                1e6 * float(np.median(times.get("again", np.nan))),
             )
         )
     return pd.DataFrame(rows, columns=COLUMNS)
@@ -209,14 +212,15 @@ def timings(results: RunResults) -> pd.DataFrame:
 def binding(results: RunResults, name: str, scenario: Scenario, substeps: int) -> float:
     """s per simulated second that the steps and calls of an engine take in an empty world; nan if
     that is not known."""
-    step, singly = (median_of(results.overheads.get((what, name, ""))) for what in (EMPTY, CALL))
+    step, singly = (overhead(results, what, name, scenario.name) for what in (EMPTY, CALL))
     return binding_of(step, singly, scenario, substeps)
 
 
-def median_of(costs: Sequence[float] | None) -> float:
+def overhead(results: RunResults, what: str, name: str, scenario: str) -> float:
+    costs = results.timing.get("overheads", {}).get(overhead_key(what, name, scenario))
     return float(np.median(costs)) if costs else np.nan
 
 
 def noise_floor(results: RunResults) -> Noise:
-    pairs = [lines for lines in results.timings.values() if {0, 1} <= lines.keys()]
-    return noise_of([median_of(pair[1]["cost"]) / median_of(pair[0]["cost"]) for pair in pairs])
+    pairs = [times for times in results.times.values() if "again" in times]
+    return noise_of([np.median(pair["again"]) / np.median(pair["cost"]) for pair in pairs])

@@ -23,7 +23,14 @@ from crosscheck2d.reports.run.playing import play_here
 from crosscheck2d.reports.run.pool import run_all
 from crosscheck2d.reports.run.results import COMMAND, RunResults
 from crosscheck2d.reports.run.store import writing
-from crosscheck2d.reports.run.suite import Means, RunPlan, RunTask, carry_out, store_cell
+from crosscheck2d.reports.run.suite import (
+    Means,
+    RunPlan,
+    RunTask,
+    carry_out,
+    cell_row,
+    store_result,
+)
 from crosscheck2d.reports.run.tables import make_tables
 from crosscheck2d.reports.terminal.progress import Progress
 from crosscheck2d.scenarios.catalogue import scenario
@@ -56,9 +63,10 @@ def played(
     with writing(folder / "out", COMMAND) as store, Progress() as progress:
         progress.start(len(tasks), len(tasks))
         for cell, result in run_all(tasks, workers, timeout=3600.0):
-            key = cell.key(scene_hash(scenarios[cell.scene]), "")
-            task = RunTask("cell", key, cell)
-            record = store_cell(store, task, scenarios[cell.scene], result, 3600.0, progress)
+            scene = scenarios[cell.scene]
+            key, to_row = cell.key(scene_hash(scene), ""), partial(cell_row, cell, scene)
+            task = RunTask("cell", key, cell.scene, tasks[cell], to_row, scene.name)
+            record = store_result(store, task, result, 3600.0, progress)
             assert record["status"] == "ok", record["reason"]
             inside += record["seconds"]
     return Cost(perf_counter() - started, inside, sum(processor()) - before)

@@ -10,7 +10,6 @@ import sys
 import time
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 
@@ -120,13 +119,6 @@ def leaves():
 
 def is_killed():
     os.kill(os.getpid(), signal.SIGKILL)
-
-
-def is_killed_once():
-    mark = Path(os.environ["CONTROL_MARK"])
-    if not mark.exists():
-        mark.touch()
-        is_killed()
 
 
 loads_slowly = partial(time.sleep, SLOW)

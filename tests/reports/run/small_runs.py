@@ -45,9 +45,9 @@ def read(folder: Path) -> RunResults:
         return RunResults.read(store)
 
 
-def cells_in(folder: Path) -> int:
+def cells_in(folder: Path, kind: str = "cell") -> int:
     try:
         with closing(Rows(folder / "results.sqlite", writing=False)) as rows:
-            return len(rows.keys("cell"))
+            return len(rows.keys(kind))
     except (OSError, ValueError):
         return 0

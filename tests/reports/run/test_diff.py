@@ -79,19 +79,17 @@ def change_cells(folder: Path, change: Callable[[dict], object]) -> None:
         store.put("run", "plan", plan)
 
 
-def change_timings(folder: Path, change: Callable[[dict], object]) -> None:
+def change_timings(folder: Path, change: Callable[[dict[str, dict]], object]) -> None:
     with writing(folder, COMMAND) as store:
         key = store.get("run", "plan").value["timing"]
         timing = store.get("timing", key).value
-        for line in timing["lines"]:
-            change(line)
+        change(timing["cells"])
         store.put("timing", key, timing)
 
 
 def put_table(table: pd.DataFrame, folder: Path) -> None:
     with writing(folder, COMMAND) as store:
-        store.put("comparison", "changed", None, csv_of(table))
-        store.put("run", "comparisons", {"all": "changed"})
+        store.put("run", "table", None, csv_of(table))
 
 
 def elsewhere(plan: dict) -> None:
@@ -246,7 +244,7 @@ def test_an_edited_scene_is_named_and_nothing_in_it_is_called_worse_or_better(
     before = Path(shutil.copytree(before, after.parent / "before"))
     for folder in (before, after):
         change_timings(folder, rounds_of([1.0] * 9))
-    timed = {one.engine: one.n for one in difference(before, after).timings}
+    timed = {engine: one.n for engine, one in difference(before, after).timings.items()}
 
     theirs = {one["cell"] for one in read(after).records if one["scenario"] == "near_miss"}
 
@@ -254,9 +252,9 @@ def test_an_edited_scene_is_named_and_nothing_in_it_is_called_worse_or_better(
         if cell["cell"] in theirs:
             cell.update(scene_hash="0" * 16, cell=cell["cell"][::-1], status="unsupported")
 
-    def renamed(line: dict) -> None:
-        if line.get("timing") in theirs:
-            line.update(timing=line["timing"][::-1])
+    def renamed(cells: dict[str, dict]) -> None:
+        for key in theirs:
+            cells[key[::-1]] = cells.pop(key)
 
     change_cells(after, edited)
     change_timings(after, renamed)
@@ -270,7 +268,7 @@ def test_an_edited_scene_is_named_and_nothing_in_it_is_called_worse_or_better(
     }
 
     assert verdicts == {"near_miss": {"other", ROUNDING}, "slow_collision": {"worse"}}
-    assert {one.engine: 2 * one.n for one in changed.timings} == timed
+    assert {engine: 2 * one.n for engine, one in changed.timings.items()} == timed
     assert [warning for warning in changed.warnings if "differs in scene: near_miss:" in warning]
     assert exit_of(before, after) == 1
     assert "near_miss: edited between the runs" in capsys.readouterr().out
@@ -309,9 +307,11 @@ def test_cells_that_only_one_run_has_are_named_and_not_worse(
 
 
 def rounds_of(costs: list[float], again: float = 1.0) -> Callable[[dict], None]:
-    def change(line: dict) -> None:
-        if "timing" in line:
-            line["cost"] = [cost * (again if line["copy"] else 1.0) for cost in costs]
+    def change(cells: dict[str, dict]) -> None:
+        for times in cells.values():
+            times["cost"] = costs
+            if "again" in times:
+                times["again"] = [cost * again for cost in costs]
 
     return change
 
@@ -324,9 +324,9 @@ def test_times_of_a_busy_machine_are_not_compared(before: Path, after: Path):
     change_timings(quiet, rounds_of([1.0] * 9))
     quieter = difference(quiet, after)
 
-    assert busy.timings == []
+    assert busy.timings == {}
     assert any("a factor of 1.50" in warning for warning in busy.warnings)
-    assert {one.verdict for one in quieter.timings} == {"worse"}
+    assert {one.verdict for one in quieter.timings.values()} == {"worse"}
 
 
 @pytest.mark.parametrize(("machine", "verdicts"), [("same", {"worse"}), ("other", set())])
@@ -340,7 +340,7 @@ def test_timings_are_judged_on_one_machine_only(
         change_plan(after, elsewhere)
     changed = difference(before, after)
 
-    assert {one.verdict for one in changed.timings} == verdicts
+    assert {one.verdict for one in changed.timings.values()} == verdicts
     assert any("abacus" in warning for warning in changed.warnings) == (machine == "other")
 
 
@@ -356,18 +356,18 @@ def test_timings_are_judged_on_one_machine_only(
     ],
 )
 def test_a_timing_is_worse_only_if_it_is_sure_and_large(ratios: list[float], verdict: str):
-    assert timing("any", sorted(ratios), median(ratios)).verdict == verdict
+    assert timing(sorted(ratios), median(ratios)).verdict == verdict
 
 
 def test_a_machine_that_is_busy_in_all_rounds_but_one_does_not_make_an_engine_slower():
-    assert timing("any", [1.0] + [3.0] * 19, 1.0).verdict == "same"
-    assert timing("any", [1.0] + [3.0] * 19, 1.5).verdict == "worse"
+    assert timing([1.0] + [3.0] * 19, 1.0).verdict == "same"
+    assert timing([1.0] + [3.0] * 19, 1.5).verdict == "worse"
 
 
 def test_the_interval_holds_the_true_median_as_often_as_it_says():
     draw = random.Random(1)
     found = [
-        timing("any", sorted(draw.expovariate(0.6931471805599453) for _ in range(20)), 1.0)
+        timing(sorted(draw.expovariate(0.6931471805599453) for _ in range(20)), 1.0)
         for _ in range(2000)
     ]
 
@@ -392,7 +392,7 @@ def test_a_scene_that_is_not_judged_any_more_is_worse(before: Path, after: Path)
 
 def test_a_run_without_tables_is_one_sentence(before: Path, after: Path):
     with writing(after, COMMAND) as store:
-        store.rows.delete("run", "comparisons")
+        store.rows.delete("run", "table")
 
     with pytest.raises(Unusable, match="make them: crosscheck report"):
         difference(before, after)

@@ -111,12 +111,18 @@ def test_workers_that_are_killed_are_replaced(long: Path, tmp_path: Path):
     assert_nothing_lost(tmp_path / "out", long)
 
 
-def test_ctrl_c_keeps_what_has_ended_and_says_how_to_go_on(long: Path, tmp_path: Path):
+@pytest.mark.parametrize(
+    ("how", "status"),
+    [(signal.SIGINT, 130), pytest.param(signal.SIGTERM, 143, marks=pytest.mark.long)],
+)
+def test_a_signal_keeps_what_has_ended_and_says_how_to_go_on(
+    long: Path, tmp_path: Path, how: int, status: int
+):
     run = begun(*LONG, "--workers", "1", cwd=tmp_path, cells=3)
-    os.killpg(run.pid, signal.SIGINT)
+    os.killpg(run.pid, how)
     _, said = run.communicate(timeout=60)
 
-    assert run.returncode == 130
+    assert run.returncode == status
     assert f"Interrupted. Kept: {cells_in(tmp_path / 'out')} finished cells." in said
     assert "Traceback" not in said
     # 1: of an engine nothing was played yet

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import csv
 import html
+from functools import partial
 from pathlib import Path
-from typing import cast
 
 import pytest
 
@@ -15,7 +15,7 @@ from crosscheck2d.reports.commands.own_solvers import checked, checks_of, lines
 from crosscheck2d.reports.run.pool import Failure
 from crosscheck2d.reports.run.results import COMMAND
 from crosscheck2d.reports.run.store import writing
-from crosscheck2d.reports.run.suite import Check, RunPlan, RunTask, store_finding
+from crosscheck2d.reports.run.suite import Check, RunTask, check_row, store_result
 from crosscheck2d.reports.terminal.progress import Progress
 from tests.reports.run.small_runs import read
 from tests.reports.terminal.command_line import crosscheck
@@ -27,14 +27,14 @@ from tests.solvers.mutants import MUTANTS
 def test_a_check_is_that_of_the_text_that_plays(tmp_path: Path):
     path = FAULTY.write(tmp_path)
     name = f"{path}:own"
-    plan = cast(RunPlan, type("Plan", (), {"engines": {name: row_of_file(path)}}))
+    task = RunTask("check", "key", name, list, partial(check_row, row_of_file(path).source))
     right = checked(path)
     later = Check(True, ["No fault found."], [], "another text")
     rows = []
     with writing(tmp_path / "out", COMMAND) as store, Progress() as progress:
         progress.start(3, 3)
         for result in (right, later, Failure("timeout", "was stopped")):
-            store_finding(store, RunTask("check", "key", name), plan, result, progress)
+            store_result(store, task, result, 60.0, progress)
             rows.append(store.get("check", "key").value)
 
     assert FAULTY.cause in right.says[0]

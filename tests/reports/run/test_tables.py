@@ -14,7 +14,7 @@ import pytest
 
 from crosscheck2d.reports.run import cells, comparing
 from crosscheck2d.reports.run.cells import JUDGE_SOURCE, ROOT, SOURCES
-from crosscheck2d.reports.run.comparing import ANSWER, COMPARED, CompareTask, store_answer
+from crosscheck2d.reports.run.comparing import ANSWER, COMPARED, CompareTask, answer_row
 from crosscheck2d.reports.run.pool import Failure
 from crosscheck2d.reports.run.results import COMMAND, RunResults
 from crosscheck2d.reports.run.store import Store, reading, writing
@@ -108,10 +108,11 @@ def killed_once(mark: Path, *given: Any) -> bytes:
 def test_a_comparison_that_fails_is_a_row_a_run_and_leaves_the_other_scene(
     store: Store, monkeypatch: pytest.MonkeyPatch
 ):
-    row = store.get("run", "comparisons").value
-    store.rows.delete(COMPARED, row["slow_collision"])
-    monkeypatch.setattr(comparing, "compare_scene", fails)
     results = RunResults.read(store)
+    scene = "slow_collision"
+    key, _ = comparing.compare_task(store, results.sources[scene], results.by_scene[scene])
+    store.rows.delete(COMPARED, key)
+    monkeypatch.setattr(comparing, "compare_scene", fails)
     made = make_tables(results, silent)
     table = pd.read_csv(store.folder / "deviations.csv")
     failed = table[table.scenario == "slow_collision"]
@@ -137,7 +138,7 @@ def test_an_answer_that_took_too_long_is_computed_again_only_with_more_time(stor
     results = RunResults.read(store)
     source = results.sources["slow_collision"]
     late = Failure("timeout", "stopped after 5 s")
-    store_answer(store, comparing.answer_key(source), late, 5.0)
+    store.put(ANSWER, comparing.answer_key(source), *answer_row(late, 5.0))
     for record in results.records:
         record["timeout_s"] = 5.0
     without = make_tables(results, silent)
@@ -196,36 +197,22 @@ def test_all_that_the_comparison_imports_of_reports_is_in_the_folder_that_is_has
 @pytest.mark.parametrize(
     ("file", "hashed"),
     [
-        ("adapters/pymunk.py", engine_source),
-        ("adapters/host/guest/driver.js", engine_source),
-        ("reference_impl/ordered.py", engine_source),
-        ("reports/compare/metrics.py", judge_source),
-        ("scenarios/truth/oracle/events.py", judge_source),
-        ("scenarios/truth/oracle/events.py", truth_source),
-        ("scenarios/truth/horizon.py", truth_source),
+        ("adapters/deeper/pymunk.py", engine_source),
+        ("adapters/host/guest/deeper/driver.js", engine_source),
+        ("reference_impl/deeper/ordered.py", engine_source),
+        ("reports/compare/deeper/metrics.py", judge_source),
+        ("scenarios/truth/oracle/deeper/events.py", judge_source),
+        ("scenarios/truth/oracle/deeper/events.py", truth_source),
+        ("scenarios/truth/deeper/horizon.py", truth_source),
     ],
 )
-def test_a_file_that_is_moved_into_a_folder_of_its_own_stays_in_the_hash(
-    file, hashed, tmp_path: Path
-):
-    where, moved = (
-        tmp_path / "before" / file,
-        tmp_path / "after" / Path(file).parent / "deeper" / Path(file).name,
-    )
-    for root in ("before", "after"):
-        for top in ("adapters", "reference_impl", "scenarios", "reports"):
-            shutil.copytree(
-                ROOT / top,
-                tmp_path / root / top,
-                ignore=shutil.ignore_patterns("out", "__pycache__"),
-            )
-    moved.parent.mkdir()
-    (tmp_path / "after" / file).rename(moved)
-    at_first = hashed(tmp_path / "before"), hashed(tmp_path / "after")
-    for path in (where, moved):
-        path.write_text(path.read_text() + "\n")
-    cells.source_hash.cache_clear()
-    cache.source_hash.cache_clear()
+def test_a_file_in_a_folder_of_its_own_is_in_the_hash(file, hashed, tmp_path: Path):
+    (tmp_path / file).parent.mkdir(parents=True)
+    hashes = []
+    for text in ("before", "after"):
+        (tmp_path / file).write_text(text)
+        cells.source_hash.cache_clear()
+        cache.source_hash.cache_clear()
+        hashes.append(hashed(tmp_path))
 
-    assert hashed(tmp_path / "before") != at_first[0]
-    assert hashed(tmp_path / "after") != at_first[1]
+    assert hashes[0] != hashes[1]

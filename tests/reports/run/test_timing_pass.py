@@ -41,8 +41,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def timing_lines(folder: Path) -> list[dict]:
-    return read(folder / "out").timing.get("lines", [])
+def times_of(folder: Path) -> dict[str, dict]:
+    return read(folder / "out").times
 
 
 def test_every_cell_that_was_played_is_timed_and_its_binding_beside_it(folder: Path):
@@ -57,7 +57,7 @@ def test_every_cell_that_was_played_is_timed_and_its_binding_beside_it(folder: P
 
 
 def test_times_are_used_again_with_their_date_and_taken_again_on_demand(folder: Path):
-    path, before = folder / "out" / TABLE, timing_lines(folder)
+    path, before = folder / "out" / TABLE, times_of(folder)
     written = path.read_bytes()
     path.unlink()
     crosscheck("report", "out", cwd=folder)
@@ -65,11 +65,11 @@ def test_times_are_used_again_with_their_date_and_taken_again_on_demand(folder: 
     done = crosscheck("run", *RUN, cwd=folder)
 
     assert again == path.read_bytes() == written
-    assert timing_lines(folder) == before
+    assert times_of(folder) == before
     taken = read(folder / "out").timing["taken"]
     assert f"The times are of {taken}. To take them again: crosscheck report " in done.stdout
     assert crosscheck("report", "out", "--timings", "10", cwd=folder).returncode == 0
-    assert timing_lines(folder) != before
+    assert times_of(folder) != before
 
 
 def test_without_a_second_nothing_is_timed(tmp_path: Path):
@@ -77,7 +77,7 @@ def test_without_a_second_nothing_is_timed(tmp_path: Path):
     take = f"crosscheck report {tmp_path / 'out'} --timings 12"
 
     assert pd.read_csv(tmp_path / "out" / TABLE).empty
-    assert timing_lines(tmp_path) == []
+    assert times_of(tmp_path) == {}
     assert f"No times were taken. To take them: {take}" in done.stdout
     assert (
         f"No times were taken. To take them: {take}"
@@ -136,14 +136,14 @@ def test_what_takes_long_has_three_rounds_and_leaves_the_others_to_the_rest(
     monkeypatch: pytest.MonkeyPatch,
 ):
     what = [
-        Timed(("overhead", key, "", ""), partial(Spent, seconds), 1.0)
+        Timed(key, partial(Spent, seconds), 1.0)
         for key, seconds in {"long": 2 * SHARE, "short": SHARE / 100}.items()
     ]
     monkeypatch.setattr(timing_pass, "overheads_of", lambda _: what)
     monkeypatch.setattr(timing_pass, "ROUNDS", 9)  # which is 1 in all other tests
-    lines = timing_pass.time_cells([], 5.0, 0)
+    overheads = timing_pass.time_cells([], 5.0, 0)["overheads"]
 
-    assert {line["overhead"]: len(line["cost"]) for line in lines} == {"long": 3, "short": 9}
+    assert {key: len(cost) for key, cost in overheads.items()} == {"long": 3, "short": 9}
 
 
 def test_what_is_slow_has_the_cost_of_when_it_was_played():
@@ -152,11 +152,8 @@ def test_what_is_slow_has_the_cost_of_when_it_was_played():
         CellToTime(key, "pymunk:matched", ENGINES["pymunk:matched"], scene, 1, seconds)
         for key, seconds in (("quick", 0.0), ("slow", 3 * SLOW))
     )
-    costs = {
-        line["timing"]: line["cost"]
-        for line in timing_pass.time_cells([quick, slow], 5.0, 0)
-        if "timing" in line
-    }
+    times = timing_pass.time_cells([quick, slow], 5.0, 0)["cells"]
+    costs = {key: timed["cost"] for key, timed in times.items()}
 
     assert costs["slow"] == [3 * SLOW / scene.duration]
     assert max(costs["quick"]) < costs["slow"][0] / 10
@@ -175,12 +172,8 @@ def test_a_call_counts_once_for_many_steps_and_for_each_step_with_a_force():
 
 def test_a_clock_that_reads_an_engine_otherwise_the_second_time_is_busy():
     def with_pairs(*ratios: float) -> RunResults:
-        lines = [
-            {"timing": str(k), "copy": copy, "cost": [cost]}
-            for k, ratio in enumerate(ratios)
-            for copy, cost in enumerate((1.0, ratio))
-        ]
-        return RunResults(None, {}, [], {}, [], {}, {"lines": lines}, True)
+        times = {str(k): {"cost": [1.0], "again": [ratio]} for k, ratio in enumerate(ratios)}
+        return RunResults(None, {}, [], {}, [], {}, {"cells": times}, True)
 
     assert is_busy(with_pairs(0.88, 1.0, 1.12, 1.12))
     assert not is_busy(with_pairs(0.92, 1.0, 1.08, 1.08))
@@ -193,7 +186,7 @@ def test_what_an_engine_refuses_is_left_out_and_not_the_rest(monkeypatch: pytest
         "key", "pymunk:matched", ENGINES["pymunk:matched"], scenario("near_miss"), 1, 0.0
     )
     monkeypatch.setattr("crosscheck2d.reports.run.stepping.empty_world", partial(int, "no world"))
-    lines = timing_pass.time_cells([refusing], 5.0, 0)
+    times = timing_pass.time_cells([refusing], 5.0, 0)
 
-    assert [line.get("timing") or line["overhead"] for line in lines].count("key") == 1
-    assert {line["overhead"] for line in lines if "overhead" in line} == {"read"}
+    assert list(times["cells"]) == ["key"]
+    assert list(times["overheads"]) == ["read of pymunk:matched in near_miss"]

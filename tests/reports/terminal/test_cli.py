@@ -16,7 +16,6 @@ from crosscheck2d.reports.compare.verdicts import VERDICTS
 from crosscheck2d.reports.lessons.catalogue import LESSONS
 from crosscheck2d.reports.run import arguments
 from crosscheck2d.reports.stability.cases import CASES
-from crosscheck2d.reports.terminal.progress import Progress
 from crosscheck2d.scenarios.catalogue import SCENARIOS
 from tests.reports.run.small_runs import read
 from tests.reports.terminal.command_line import CROSSCHECK, crosscheck, forked
@@ -89,16 +88,6 @@ def test_a_run_writes_its_files(small_run: Path):
     assert results.header["seed"] == 0
     assert results.complete
     assert (small_run / "report.html").stat().st_size < 8e6
-
-
-def test_tables_are_made_again_from_the_rows(small_run: Path):
-    names = ("deviations.csv", "runs.csv")
-    before = {name: (small_run / name).read_bytes() for name in names}
-    for name in names:
-        (small_run / name).unlink()
-
-    assert crosscheck("report", small_run, cwd=small_run.parent).returncode == 0
-    assert {name: (small_run / name).read_bytes() for name in names} == before
 
 
 @pytest.mark.slow
@@ -182,16 +171,6 @@ def test_truth_says_why_there_is_none(tmp_path: Path):
     assert "while a thrust that turns with it acts" in done.stderr
 
 
-@pytest.mark.parametrize("terminal", [True, False])
-def test_who_waits_for_an_exact_answer_sees_so_on_a_terminal_only(
-    terminal: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-):
-    monkeypatch.setattr("sys.stderr.isatty", lambda: terminal)
-    with Progress() as progress:
-        progress.say("the exact answer to it")
-    assert ("the exact answer to it" in capsys.readouterr().err) == terminal
-
-
 @pytest.mark.parametrize(
     "words", [["run", "--out", "new"], ["truth"], ["stability", "--vary", "speed"], ["play"]]
 )
@@ -242,29 +221,3 @@ def test_a_scene_file_may_not_take_a_name_that_is_taken(tmp_path: Path):
 
     assert done.returncode == 2
     assert "taken by a scenario of the catalogue" in done.stderr
-
-
-def test_a_folder_that_holds_something_else_is_left_alone(small_run: Path, tmp_path: Path):
-    (tmp_path / "out").mkdir()
-    (tmp_path / "out" / "thesis.txt").write_text("years of work")
-    (small_run / "note.txt").write_text("mine")
-    done = (
-        crosscheck(*SMALL, "--out", "out", cwd=tmp_path),
-        crosscheck(*SMALL, "--out", small_run, cwd=tmp_path),
-    )
-    (small_run / "note.txt").unlink()
-
-    assert [one.returncode for one in done] == [2, 2]
-    assert "thesis.txt" in done[0].stderr
-    assert [path.name for path in (tmp_path / "out").iterdir()] == ["thesis.txt"]
-
-
-@pytest.mark.slow
-def test_an_earlier_run_is_replaced_as_a_whole(small_run: Path):
-    again = crosscheck(
-        "run", "near_miss", "--engine", "pymunk:matched", "--out", "here", cwd=small_run.parent
-    )
-
-    assert again.returncode == 0
-    assert set(pd.read_csv(small_run / "runs.csv").scenario) == {"near_miss"}
-    assert [path.name for path in small_run.parent.iterdir()] == ["here"]

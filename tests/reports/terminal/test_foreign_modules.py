@@ -5,8 +5,6 @@ from __future__ import annotations
 
 import ast
 import multiprocessing
-import os
-import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterable
@@ -242,70 +240,6 @@ def test_a_new_process_finds_the_package_where_nothing_is_installed():
     words = safe_path.python("import crosscheck2d.adapters; print(crosscheck2d.__file__)")
     done = subprocess.run([words[0], "-S", *words[1:]], capture_output=True, text=True)
     assert done.stdout.strip() == str(ROOT / "__init__.py"), done.stderr[-500:]
-
-
-@pytest.fixture(scope="module")
-def clone(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Callable[[], str]]:
-    base = tmp_path_factory.mktemp("clone")
-    ran = trapped(
-        base / "crosscheck2d",
-        {"scipy", "yaml", "pyarrow", "cffi", "random", "secrets", "numbers", *LIBRARIES},
-    )
-    shutil.copy(ROOT / "__init__.py", base / "crosscheck2d")
-    for name in SOURCE:
-        shutil.copytree(
-            ROOT / name,
-            base / "crosscheck2d" / name,
-            ignore=shutil.ignore_patterns("__pycache__", "out"),
-        )
-    for name, solver in SOLVERS.items():
-        (base / "crosscheck2d" / f"my_{name}").write_text(solver.read_text())
-    return base / "crosscheck2d", ran
-
-
-@pytest.mark.parametrize(
-    "begin",
-    [
-        ["-P", "-c", "from crosscheck2d.reports.__main__ import main; main()"],
-        pytest.param(["-m", "crosscheck2d.reports"], marks=pytest.mark.slow),
-    ],
-)
-@pytest.mark.parametrize(
-    "words",
-    [
-        ["list", "engines"],
-        pytest.param(["check", "my_plain.py"], marks=pytest.mark.long),
-        pytest.param(["check", "my_plain.js"], marks=pytest.mark.long),
-        pytest.param([*RUN.split(), "reference:exercise"], marks=pytest.mark.long),
-    ],
-)
-def test_a_module_beside_readme_is_not_run_where_everybody_stands(
-    clone: tuple[Path, Callable[[], str]], begin: list[str], words: list[str]
-):
-    root, ran = clone
-    at_end = f"import sys; sys.path.append({str(root)!r}); sys.argv[0] = 'crosscheck'; "
-    begin = begin if begin[0] == "-m" else [*begin[:2], at_end + begin[2]]
-    done = subprocess.run(
-        [sys.executable, *begin, *words],
-        cwd=root,
-        env=os.environ | {"PYTHONPATH": str(root.parent)},
-        capture_output=True,
-        text=True,
-        timeout=500,
-    )
-
-    assert ran() == "", done.stderr
-    assert done.returncode == 0, done.stderr
-
-
-def test_without_the_safe_path_a_module_beside_readme_is_run(clone: tuple[Path, Callable[[], str]]):
-    root, ran = clone
-    code = f"import sys; sys.path.append({str(root)!r}); import numba.core.types; import scipy"
-    done = subprocess.run([sys.executable, "-P", "-c", code], capture_output=True, text=True)
-
-    assert "scipy.py of the current folder was run" in done.stderr
-    assert ran() == "scipy "
-    (root.parent / f"{root.name}.ran").unlink()
 
 
 @pytest.mark.slow

@@ -20,8 +20,6 @@ import pytest
 
 from crosscheck2d.reports.run.results import COMMAND
 from crosscheck2d.reports.run.store import writing
-from crosscheck2d.reports.terminal.counts import counted
-from tests.reports.run.small_runs import cells_in
 from tests.reports.run.test_disturbed import alive
 from tests.reports.terminal.command_line import crosscheck, wait_for
 from tests.reports.terminal.stopping import AT_MOST, Command, assert_ended, busyness
@@ -39,7 +37,6 @@ TRUTH, ANSWER = (
 BOTH = [signal.SIGTERM, signal.SIGINT]
 # In the gate each signal is sent in another test, in the long run both are sent in both.
 CTRL_C = [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)]
-TERM = [signal.SIGTERM, pytest.param(signal.SIGINT, marks=pytest.mark.long)]
 FILE = """
 name = "two"
 duration = 1.0
@@ -127,22 +124,6 @@ def test_a_command_ends_at_any_stage_though_compiled_code_never_returns(
     ended = command.stop(how, whole_group=how == signal.SIGINT)
 
     assert_ended(ended, how)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("how", TERM)
-def test_what_was_played_is_kept_and_gone_on_with(place: Path, done: Path, how: int):
-    command = Command(
-        *TWO, cwd=place, stalled="crosscheck2d.reports.compare.comparison:_measure"
-    ).stalled()
-    ended = command.stop(how)
-    had = cells_in(place / "out")
-    resumed = crosscheck(*TWO, cwd=place)
-
-    assert_ended(ended, how)
-    assert f"Interrupted. Kept: {counted(had, 'finished cell')}." in ended.said
-    assert resumed.returncode == 0, resumed.stderr
-    assert (place / "out" / "deviations.csv").read_bytes() == (done / "deviations.csv").read_bytes()
 
 
 @pytest.mark.slow

@@ -11,7 +11,6 @@ from rich.cells import cell_len
 from rich.table import Table
 
 from crosscheck2d.adapters.engines import ENGINES
-from crosscheck2d.reports.commands import diff
 from crosscheck2d.reports.commands.diff import Change
 from crosscheck2d.reports.stability.cases import CASES
 from crosscheck2d.reports.stability.command import print_limits
@@ -232,8 +231,7 @@ def test_things_are_counted_in_one_way():
 
 
 def test_a_change_between_two_runs_is_a_line():
-    change = Change("pymunk:matched", "near_miss  dt 0.01 s  status", "ok", "crashed", "worse")
+    what = "near_miss  dt 0.01 s  status"
+    change = Change("near_miss", "pymunk:matched", what, "ok", "crashed", "worse")
 
-    assert diff.change_text(change) == (
-        "worse: pymunk:matched, near_miss  dt 0.01 s  status: ok → crashed"
-    )
+    assert change.text == "worse: pymunk:matched, near_miss  dt 0.01 s  status: ok → crashed"
