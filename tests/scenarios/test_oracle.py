@@ -220,14 +220,14 @@ def test_an_edge_of_the_wrap_sets_the_centre_onto_the_other():
 
 
 def test_used_up_digits_end_the_truth(monkeypatch: pytest.MonkeyPatch):
+    one = scenario("falling_box")
+    whole = one.truth(one.times)  # before: it is kept for others
     monkeypatch.setattr("crosscheck2d.scenarios.truth.exact.FEWEST_BITS", 56)
     monkeypatch.setattr("crosscheck2d.scenarios.truth.exact.MOST_BITS", 100)
-    one = scenario("falling_box")
     record = computed(one)
 
     assert 0.1 < record.horizon < one.duration
     assert "used up" in record.reason
-    whole = one.truth(one.times)
     k = len(states(one, record))
     np.testing.assert_allclose(
         states(one, record).position, whole.position[:k], rtol=0, atol=2 * ACCURACY
