@@ -14,7 +14,7 @@ from typing import Any
 class Searched:
     """The public settings of an engine that `crosscheck tune` searches for its matched profile."""
 
-    chosen: Mapping[str, Any]  # setting -> its value in the matched profile
+    chosen: dict[str, Any]  # setting -> its value in the matched profile
     # setting -> (the values tried, the chosen one among them; meaning and unit)
     settings: Mapping[str, tuple[Sequence[Any], str]]
     # two settings with related effects, tried together: names, values of the first, of the second

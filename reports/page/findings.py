@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck2d.adapters.conformance.laws import ALLOWED
+from crosscheck2d.adapters.conformance.physics import ALLOWED
 from crosscheck2d.adapters.conformance.probe import Departure
 from crosscheck2d.adapters.engines import ENGINES, OWN
 from crosscheck2d.reports.compare.comparison import Comparison
