@@ -156,9 +156,8 @@ class Box2DEngine:
         # Attribute by attribute: box2d-py has no bulk read.
         n, bodies = self.scene.n, self.bodies
         position = np.array([tuple(b.position) for b in bodies], float).reshape(n, 2) / self.length
-        velocity = (
-            np.array([tuple(b.linearVelocity) for b in bodies], float).reshape(n, 2) / self.speed
-        )
+        velocity = np.array([tuple(b.linearVelocity) for b in bodies], float).reshape(n, 2)
+        velocity /= self.speed
         angle = np.array([b.angle for b in bodies], float)
         angular_velocity = np.array([b.angularVelocity for b in bodies], float) / self.time
         if self.matched:
@@ -180,6 +179,7 @@ class Box2DEngine:
         matched, world, chosen = self.matched, self.world, self.chosen
         fixture = self.bodies[0].fixtures[0]
         iterations = f"{self.velocity_iterations}, {self.position_iterations}"
+        edge = self.walls[0].fixtures[0].shape.radius / self.length if self.walls else "no wall"
         return {
             "unit of time in s": (self.time if matched else None, KEPT),
             "unit of length in m": (1 / self.length if matched else None, KEPT),
@@ -187,10 +187,7 @@ class Box2DEngine:
             "linear slop in m": (None, Box2D.b2_linearSlop / self.length),
             "speed cap in m/s": (None, self.speed_cap),
             "spin cap in rad/s": (None, self.spin_cap),
-            "wall skin in m": (
-                None if chosen["skin"] else 0.0,
-                self.walls[0].fixtures[0].shape.radius / self.length if self.walls else "no wall",
-            ),
+            "wall skin in m": (None if chosen["skin"] else 0.0, edge),
             "friction": (self.friction, fixture.friction),
             "restitution": (self.scene.restitution, fixture.restitution),
             "sleeping": (self.sleeping if matched else None, world.GetAllowSleeping()),

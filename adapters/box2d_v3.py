@@ -3,8 +3,7 @@ sweep."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from functools import wraps
+from collections.abc import Mapping
 from math import atan2, cos, pi, sin
 from threading import Lock
 from time import perf_counter
@@ -36,17 +35,6 @@ SPIN_CAP = (
 )
 # it is global to the process: threads take turns, so that each world gets its own unit
 LENGTH_UNIT = Lock()
-
-
-def in_its_unit(method: Callable[..., None]) -> Callable[..., None]:
-    # Decorator for a method that sets the length unit and needs it until it returns.
-
-    @wraps(method)
-    def alone(*arguments: Any, **named: Any) -> None:
-        with LENGTH_UNIT:
-            method(*arguments, **named)
-
-    return alone
 
 
 class Box2DV3:
@@ -82,8 +70,11 @@ class Box2DV3:
         self.tuning = tuned(self.chosen)
         self.sleeping = not self.matched if sleeping is None else sleeping
 
-    @in_its_unit
     def load(self, scene: Scene, dt: float) -> None:
+        with LENGTH_UNIT:
+            self._load(scene, dt)
+
+    def _load(self, scene: Scene, dt: float) -> None:
         must_fit(scene)
         self.scene, self.dt, self.steps = scene, dt, 0
         self.friction = of_shapes(scene, self.matched, self.asked_friction)
@@ -108,24 +99,17 @@ class Box2DV3:
             self.every.append(body)
         for w in range(len(scene.walls)):
             self._wall(w)
-        self.angle, self.spin, self.seen = (
-            np.array(scene.angle),
-            np.array(scene.angular_velocity),
-            0,
-        )
+        self.angle, self.spin = np.array(scene.angle), np.array(scene.angular_velocity)
+        self.seen = 0
 
     def _options(self) -> dict[str, float]:
-        given: dict[str, float] = {}
+        given, names = dict[str, float](), ("restitution_threshold", "maximum_linear_speed")
         if self.matched:
             given = {"maximum_linear_speed": 1e9}
         elif "length_unit" in self.chosen:  # which would scale these, too
-            given = {"maximum_linear_speed": 400.0, "restitution_threshold": 1.0}
+            given = dict(zip(names, (1.0, 400.0)))
         given = given | self.chosen
-        return {
-            name: given[name]
-            for name in ("restitution_threshold", "maximum_linear_speed")
-            if name in given
-        }
+        return {name: given[name] for name in names if name in given}
 
     def _shape(self) -> Any:
         friction = {} if self.friction is None else {"friction": self.friction}
@@ -167,18 +151,18 @@ class Box2DV3:
         self.bodies[disk].apply_force_to_center(vector(force))
         self.bodies[disk].apply_torque(float(torque))
 
-    @in_its_unit
     def step(self, count: int = 1) -> None:
-        pyb2d3.set_length_units_per_meter(self.unit)  # another world may have changed it since
-        for _ in range(count):
-            self.world.step(self.dt, self.substeps)
-            if self.listening:
-                self._listen()
-            self.steps += 1
-            if self.scene.wrap is not None:
-                started = perf_counter()
-                self._wrap()
-                self.wrapping += perf_counter() - started
+        with LENGTH_UNIT:
+            pyb2d3.set_length_units_per_meter(self.unit)  # another world may have changed it since
+            for _ in range(count):
+                self.world.step(self.dt, self.substeps)
+                if self.listening:
+                    self._listen()
+                self.steps += 1
+                if self.scene.wrap is not None:
+                    started = perf_counter()
+                    self._wrap()
+                    self.wrapping += perf_counter() - started
 
     def _listen(self) -> None:
         for collision in self.world.get_contact_events().hit_events():

@@ -20,6 +20,10 @@ except ImportError:  # before pymunk 6.6
     batch = None  # type: ignore[assignment]
 
 OF_SHAPES = ("elasticity", "friction")  # the engine multiplies the two of a pair
+OF_SPACE = (
+    *("iterations", "collision_slop", "collision_bias", "collision_persistence", "damping"),
+    "sleep_time_threshold",
+)
 MATCHED = read_searched("pymunk").chosen
 
 
@@ -51,11 +55,8 @@ class Pymunk:
     ) -> None:
         self.matched = profile == "matched"
         self.turning, self.spatial_hash = turning, spatial_hash
-        self.chosen = (
-            {name: settings.pop(name, value) for name, value in MATCHED.items()}
-            if self.matched
-            else {}
-        )
+        matched = MATCHED if self.matched else {}
+        self.chosen = {name: settings.pop(name, value) for name, value in matched.items()}
         self.changed = settings
 
     def load(self, scene: Scene, dt: float) -> None:
@@ -181,17 +182,7 @@ class Pymunk:
             "restitution of a pair": shape.elasticity**2,
             "friction": shape.friction,
             "friction of a pair": shape.friction**2,
-            **{
-                name: getattr(self.space, name, NO_SUCH)
-                for name in (
-                    "iterations",
-                    "collision_slop",
-                    "collision_bias",
-                    "collision_persistence",
-                    "damping",
-                    "sleep_time_threshold",
-                )
-            },
+            **{name: getattr(self.space, name, NO_SUCH) for name in OF_SPACE},
         }
         return {name: (self.asked.get(name), value) for name, value in resolved.items()}
 

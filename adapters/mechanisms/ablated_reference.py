@@ -33,21 +33,8 @@ from crosscheck2d.reference_impl.state import Disks, World
 
 Collision = tuple[int, int, int, float]  # step, i, j or -1 - wall, impulse N s
 STAGES = (
-    "accelerate",
-    "move",
-    "pairs",
-    "walls",
-    "detect",
-    "by_island",
-    "by_colour",
-    "aim",
-    "warm_start",
-    "bounce",
-    "cap",
-    "position_correction",
-    "nudge",
-    "soften",
-    "relax",
+    *("accelerate", "move", "pairs", "walls", "detect", "by_island", "by_colour", "aim"),
+    *("warm_start", "bounce", "cap", "position_correction", "nudge", "soften", "relax"),
     "restitute",
 )
 ACCELERATE, MOVE, PAIRS, WALLS, DETECT, BY_ISLAND, BY_COLOUR, AIM = range(8)
