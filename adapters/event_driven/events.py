@@ -197,7 +197,7 @@ class EventEngine:
             gap = sum(d * d for d in apart) - reach * reach
             closing = sum(d * v for d, v in zip(apart, speeds))
             if gap < 0:
-                overlap = -float(gap) / (float(reach) + np.hypot(*map(float, apart)))
+                overlap = -float(gap) / (float(reach) + np.hypot(float(apart[0]), float(apart[1])))
                 by = f"{overlap:.3g} m"
                 raise NoTruth(f"disks {i} and {j} overlap by {by} at the start: move one {by} away")
             if gap == 0 and closing < 0:

@@ -25,12 +25,16 @@ class Option(NamedTuple):
 
 
 OPTIONS = tuple(
-    Option(name, change, make)
+    option
     for name, row in ENGINES.items()
-    for change, make in [
-        *((change, partial(row.make, **settings)) for change, settings in row.options.items()),
-        *((f"as {other}", it.make) for other, it in ENGINES.items() if it.bits_of == name),
-    ]
+    for option in (
+        *(Option(name, what, partial(row.make, **it)) for what, it in row.options.items()),
+        *(
+            Option(name, f"as {same}", it.make)
+            for same, it in ENGINES.items()
+            if it.bits_of == name
+        ),
+    )
 )
 """What cannot be changed is not here: Munk2D has no CCD and always starts warm; Box2D 3.1 has
 b2World_EnableWarmStarting, which pyb2d3 does not hand on; no library can disable its broad phase.
