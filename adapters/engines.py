@@ -247,6 +247,19 @@ FETCHED: dict[str, EngineRow] = {
     ),
 }
 
+# An engine that plays only where it is named: no table or page has its results.
+NAMED: dict[str, EngineRow] = {
+    **_profiles(
+        "box2d_wasm",
+        partial(_made, PACKAGE, "box2d_wasm", "box2d3-wasm", float32=True),
+        "Box2D after 3.1 (box2d3-wasm 5.2, float32), own defaults, as box2d_v3:shipped",
+        "Box2D after 3.1, matched as box2d_v3 is; allowFastRotation: no cap on spins",
+        alpha=0.625,
+        rounding=FLOAT32,
+        package="box2d3-wasm",
+    )
+}
+
 OWN = ":own"  # the profile of a solver's file; its engine is the path
 
 
@@ -254,8 +267,8 @@ _read: dict[str, EngineRow] = {}  # the rows of solvers' files, as they were whe
 
 
 def row_of(name: str) -> EngineRow:
-    """The row of an engine: from `ENGINES`, from `FETCHED`, of one of them at another version, or
-    for a solver's file `PATH:own`, which is read once.
+    """The row of an engine: from `ENGINES`, `FETCHED` or `NAMED`, of one at another version, or for
+    a solver's file `PATH:own`, which is read once.
 
     Raises:
         KeyError: it is none of them.
@@ -269,7 +282,7 @@ def row_of(name: str) -> EngineRow:
 
 def packages() -> dict[str, tuple[str, bool]]:
     # Engine -> the package that other versions of it come in, and whether it is npm's.
-    rows = ((name.partition(":")[0], row) for name, row in (ENGINES | FETCHED).items())
+    rows = ((name.partition(":")[0], row) for name, row in (ENGINES | FETCHED | NAMED).items())
     return {
         name: (row.package or row.wheel, bool(row.package))
         for name, row in rows
@@ -290,7 +303,7 @@ def parsed(name: str) -> tuple[str, LibraryAtVersion | None]:
 
 def known_row(name: str) -> EngineRow | None:
     usual, library = parsed(name)
-    row = ENGINES.get(usual) or FETCHED.get(usual)
+    row = (ENGINES | FETCHED | NAMED).get(usual)
     if row is None or library is None:
         return row
     assert isinstance(row.make, partial)
