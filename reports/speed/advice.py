@@ -19,8 +19,8 @@ from crosscheck2d.adapters.engine import Engine
 from crosscheck2d.adapters.engines import OWN, row_of
 from crosscheck2d.adapters.mechanisms.options import OPTIONS
 from crosscheck2d.adapters.play import play_once
+from crosscheck2d.reports.compare.accuracy import kept_from
 from crosscheck2d.reports.compare.delays import jumps_of
-from crosscheck2d.reports.compare.pareto import kept_from
 from crosscheck2d.reports.compare.verdicts import first_failed
 from crosscheck2d.reports.compare.view import View, beside, cut
 from crosscheck2d.reports.page.style import number

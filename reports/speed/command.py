@@ -11,8 +11,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from crosscheck2d.adapters.engines import ENGINES, OWN, row_of
-from crosscheck2d.reports.compare.pareto import ACCURACIES, said_of_cheaper
-from crosscheck2d.reports.compare.pooling import WHO, said_of_pool
+from crosscheck2d.reports.compare.accuracy import ACCURACIES, WHO, said_of_cheaper, said_of_pool
 from crosscheck2d.reports.run.arguments import checked_engines, checked_scenes, opening
 from crosscheck2d.reports.run.cells import about
 from crosscheck2d.reports.run.made import digest_of

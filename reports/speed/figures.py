@@ -12,8 +12,7 @@ import numpy as np
 import pandas as pd
 
 from crosscheck2d.adapters.engines import DISTINCT, ENGINES
-from crosscheck2d.reports.compare.pareto import YARDSTICK
-from crosscheck2d.reports.compare.pooling import WHO
+from crosscheck2d.reports.compare.accuracy import WHO, YARDSTICK
 from crosscheck2d.reports.speed.tables import Results, names_of
 from crosscheck2d.reports.terminal.foreign_text import put_text
 

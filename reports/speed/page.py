@@ -13,12 +13,20 @@ import numpy as np
 import pandas as pd
 
 from crosscheck2d.adapters.mechanisms.table import NAMES
-from crosscheck2d.reports.compare.order import ELSEWHERE, UNSTEADY
-from crosscheck2d.reports.compare.pareto import ACCURACIES, front, said_of_cheaper
-from crosscheck2d.reports.compare.pooling import WHO, said_of_pool, without_idle
-from crosscheck2d.reports.page import kit, situations, style
+from crosscheck2d.reports.compare.accuracy import (
+    ACCURACIES,
+    ELSEWHERE,
+    UNSTEADY,
+    WHO,
+    front,
+    said_of_cheaper,
+    said_of_pool,
+    without_idle,
+)
+from crosscheck2d.reports.page import kit, style
 from crosscheck2d.reports.page.drawing import Line, draw_lines, new_figure, svg_of
-from crosscheck2d.reports.page.links import neighbours
+from crosscheck2d.reports.page.kit import neighbours
+from crosscheck2d.reports.page.scenes import SITUATIONS, situations_of
 from crosscheck2d.reports.page.style import number
 from crosscheck2d.reports.run.scenes import open_scene
 from crosscheck2d.reports.speed import budget
@@ -138,14 +146,14 @@ def situation_section(results: Results) -> list[kit.Section]:
     of_scene = {}
     for scene in plan.effort.scenes:
         if (name := open_scene(scene, plan.seed).name) in results.asks:
-            of_scene[name] = situations.situations_of(*scored(scene, plan.seed))
+            of_scene[name] = situations_of(*scored(scene, plan.seed))
     sizes = points.groupby("scenario").step_size.unique()
     middle = points.scenario.map({scene: sorted(k)[len(k) // 2] for scene, k in sizes.items()})
     here = points[points.step_size == middle].assign(name=names_of)
     here = here.assign(situation=here.scenario.map(of_scene)).explode("situation")
     medians = here.groupby(["situation", "name"], sort=False)[["error", "cost"]].median()
     names, rows = list(dict.fromkeys(here.name)), []
-    titles = [title for title in situations.SITUATIONS if title in set(here.situation)]
+    titles = [title for title in SITUATIONS if title in set(here.situation)]
     for title in titles:
         errors = medians.error.loc[title].reindex(names)
         best = errors[np.isfinite(errors)].min()
@@ -158,7 +166,7 @@ def situation_section(results: Results) -> list[kit.Section]:
                 for error, cost in cells
             ]
         )
-    notes = [kit.TableCell(t, notes=(kit.TableCell(situations.SITUATIONS[t]),)) for t in titles]
+    notes = [kit.TableCell(t, notes=(kit.TableCell(SITUATIONS[t]),)) for t in titles]
     frame = pd.DataFrame(rows, notes, names, dtype=object)
     return [section("which", [kit.Table(frame)])] if titles else []
 

@@ -11,19 +11,24 @@ import pandas as pd
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.adapters.mechanisms.options import SWEEPS
 from crosscheck2d.adapters.mechanisms.table import MECHANISMS
-from crosscheck2d.reports.compare.order import FINEST, Order, median_interval, order_of
-from crosscheck2d.reports.compare.pareto import (
+from crosscheck2d.reports.compare.accuracy import (
     ACCURACIES,
     FAILED,
+    FINEST,
     NOT_REACHED,
     NOT_TIMED,
+    POOLED,
     UNREACHABLE,
+    WHO,
     YARDSTICK,
+    Order,
     cost_to_reach,
+    median_interval,
+    order_of,
     paired_cost,
+    pooled,
     yardstick_of,
 )
-from crosscheck2d.reports.compare.pooling import POOLED, WHO, pooled
 from crosscheck2d.reports.run.scenes import open_scene
 from crosscheck2d.reports.run.stepping import CALL, EMPTY, READ, binding_of
 from crosscheck2d.reports.run.timing import WARM_UP, Noise, noise_of

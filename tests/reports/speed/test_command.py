@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from crosscheck2d.adapters.engines import read_row
-from crosscheck2d.reports.compare.pooling import POOLED
+from crosscheck2d.reports.compare.accuracy import POOLED
 from crosscheck2d.reports.run.cells import about
 from crosscheck2d.reports.run.store import writing
 from crosscheck2d.reports.speed import ladder, measure

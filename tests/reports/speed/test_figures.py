@@ -11,7 +11,7 @@ import pytest
 
 from crosscheck2d.adapters.engines import DISTINCT, ENGINES
 from crosscheck2d.adapters.mechanisms.table import MECHANISMS
-from crosscheck2d.reports.compare.pareto import YARDSTICK
+from crosscheck2d.reports.compare.accuracy import YARDSTICK
 from crosscheck2d.reports.run.scenes import open_scene
 from crosscheck2d.reports.speed import budget, figures, ladder, tables
 from crosscheck2d.reports.speed.budget import budget_of

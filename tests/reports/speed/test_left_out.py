@@ -7,8 +7,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from crosscheck2d.reports.compare.order import ORDER
-from crosscheck2d.reports.compare.pareto import FAILED, NOT_TIMED, UNREACHABLE, cost_to_reach
+from crosscheck2d.reports.compare.accuracy import (
+    FAILED,
+    NOT_TIMED,
+    ORDER,
+    UNREACHABLE,
+    cost_to_reach,
+)
 from crosscheck2d.reports.page.kit import Table
 from crosscheck2d.reports.speed import page, tables
 from crosscheck2d.reports.speed.measure import SIZE, Measured

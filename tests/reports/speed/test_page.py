@@ -17,9 +17,8 @@ from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.adapters.mechanisms.options import OPTIONS
 from crosscheck2d.adapters.mechanisms.table import MECHANISMS
 from crosscheck2d.adapters.play import play
+from crosscheck2d.reports.compare.accuracy import ACCURACIES, FAILED, UNREACHABLE, said_of_pool
 from crosscheck2d.reports.compare.comparison import compare
-from crosscheck2d.reports.compare.pareto import ACCURACIES, FAILED, UNREACHABLE
-from crosscheck2d.reports.compare.pooling import said_of_pool
 from crosscheck2d.reports.run.arguments import opening
 from crosscheck2d.reports.run.cells import about
 from crosscheck2d.reports.speed import figures

@@ -10,8 +10,8 @@ import pandas as pd
 import pytest
 
 from crosscheck2d.adapters.engines import ENGINES, FETCHED, NAMED
+from crosscheck2d.reports.compare.comparison import COLUMNS
 from crosscheck2d.reports.compare.metrics import METRICS
-from crosscheck2d.reports.compare.table import COLUMNS
 from crosscheck2d.reports.compare.verdicts import VERDICTS
 from crosscheck2d.reports.lessons.catalogue import LESSONS
 from crosscheck2d.reports.run import arguments
