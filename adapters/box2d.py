@@ -14,7 +14,7 @@ from crosscheck2d.adapters.engine import KEPT, PASSED, ContactImpulse
 from crosscheck2d.adapters.float32 import must_fit, must_not_be_cut, rounding, vector
 from crosscheck2d.adapters.friction import of_shapes
 from crosscheck2d.adapters.library_versions import BOX2D, version
-from crosscheck2d.adapters.matched import GEOMETRY, Searched
+from crosscheck2d.adapters.matched import read_searched
 from crosscheck2d.scenarios.model import Array, Scene, State
 
 SHIPPED: dict[str, Any] = {
@@ -26,74 +26,7 @@ SHIPPED: dict[str, Any] = {
     "warm_starting": True,
     "skin": True,
 }
-MATCHED: dict[str, Any] = {
-    "time_unit": 1000.0,
-    "length_unit": 0.125,
-    "step_unit": 2.0,
-    "velocity_iterations": 8,
-    "position_iterations": 3,
-    "continuous": True,
-    "bullet": True,
-    "sub_stepping": False,
-    "warm_starting": True,
-    "skin": False,
-}
-"""What the profiles choose: `time_unit` in s, `length_unit` in smallest radii.
-`adapters/matched.csv` holds what else was tried."""
-
-SEARCHED = Searched(
-    MATCHED,
-    {
-        "velocity_iterations": ((4, 8, 20, 50), "passes of the impulse solver; the manual has 8"),
-        "position_iterations": (
-            (0, 1, 3, 8),
-            "passes of the position correction; the manual has 3",
-        ),
-        "continuous": (
-            (False, True),
-            "continuous collision with walls and static disks; on by default",
-        ),
-        "bullet": ((False, True), "the same between disks that move, where `continuous` is on"),
-        "sub_stepping": (
-            (False, True),
-            "one continuous collision a call, where `continuous` is on",
-        ),
-        "warm_starting": ((True, False), "begin with the impulses of the last step; on by default"),
-        "time_unit": (
-            (1.0, 1e3, 1e4),
-            (
-                "s; closing speeds below a unit of length in a unit of time are inelastic, which is"
-                " compiled in"
-            ),
-        ),
-        "length_unit": (
-            (0.015, 0.03, 0.06, 0.125, 0.25, 0.5, 1.0),
-            (
-                "smallest radii; slop 0.005, tolerance of continuous collision 0.015 and cap 2"
-                " units are compiled in"
-            ),
-        ),
-        "step_unit": (
-            (0.6, 1.0, 2.0, 4.0),
-            "ways of the fastest disk in a step: a unit of length at least",
-        ),
-    },
-    (
-        (("continuous", "bullet"), (False, True), (False, True)),
-        (("length_unit", "step_unit"), (0.03, 0.06), (1.0, 4.0)),
-    ),
-    {
-        "radius of an edge (wall skin)": f"0: {GEOMETRY}",
-        "walls of boxes or chains": "two-sided segments are what the scene states",
-        "b2_velocityThreshold, b2_linearSlop, b2_maxTranslation, b2_baumgarte, b2_toiSlop": (
-            "compiled in; the binding's attributes of these names are copies; moved by the units"
-            " alone"
-        ),
-        "contact.restitution in PreSolve": "Python code in place of the engine's own collision law",
-        "friction": "as the scene states: that of a pair is the root of the product",
-        "linearDamping, sleeping": "0 and off: as the scene states",
-    },
-)
+MATCHED = read_searched("box2d").chosen
 
 
 class Box2DEngine:
@@ -106,7 +39,7 @@ class Box2DEngine:
     continuous collision; or twice the step displacement of the fastest disk if that is more,
     because Box2D cuts motion at 2 units per step; a scene that still reaches this cap is refused.
     Continuous collision, also between disks, puts collisions at their own time within a step. No
-    sleep or wall skin. The values are `MATCHED`, by `crosscheck tune`.
+    sleep or wall skin. The values are those of matched.toml, by `crosscheck tune`.
 
     Changed one at a time by `options.py`, `table.py` and `crosscheck tune`: `sleeping` (None: the
     profile's), `turning` (False: no inertia, so no spin), `friction` (None: as above); `settings`
@@ -223,9 +156,8 @@ class Box2DEngine:
         # Attribute by attribute: box2d-py has no bulk read.
         n, bodies = self.scene.n, self.bodies
         position = np.array([tuple(b.position) for b in bodies], float).reshape(n, 2) / self.length
-        velocity = (
-            np.array([tuple(b.linearVelocity) for b in bodies], float).reshape(n, 2) / self.speed
-        )
+        velocity = np.array([tuple(b.linearVelocity) for b in bodies], float).reshape(n, 2)
+        velocity /= self.speed
         angle = np.array([b.angle for b in bodies], float)
         angular_velocity = np.array([b.angularVelocity for b in bodies], float) / self.time
         if self.matched:
@@ -247,6 +179,7 @@ class Box2DEngine:
         matched, world, chosen = self.matched, self.world, self.chosen
         fixture = self.bodies[0].fixtures[0]
         iterations = f"{self.velocity_iterations}, {self.position_iterations}"
+        edge = self.walls[0].fixtures[0].shape.radius / self.length if self.walls else "no wall"
         return {
             "unit of time in s": (self.time if matched else None, KEPT),
             "unit of length in m": (1 / self.length if matched else None, KEPT),
@@ -254,10 +187,7 @@ class Box2DEngine:
             "linear slop in m": (None, Box2D.b2_linearSlop / self.length),
             "speed cap in m/s": (None, self.speed_cap),
             "spin cap in rad/s": (None, self.spin_cap),
-            "wall skin in m": (
-                None if chosen["skin"] else 0.0,
-                self.walls[0].fixtures[0].shape.radius / self.length if self.walls else "no wall",
-            ),
+            "wall skin in m": (None if chosen["skin"] else 0.0, edge),
             "friction": (self.friction, fixture.friction),
             "restitution": (self.scene.restitution, fixture.restitution),
             "sleeping": (self.sleeping if matched else None, world.GetAllowSleeping()),

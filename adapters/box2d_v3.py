@@ -3,8 +3,7 @@ sweep."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from functools import wraps
+from collections.abc import Mapping
 from math import atan2, cos, pi, sin
 from threading import Lock
 from time import perf_counter
@@ -18,7 +17,7 @@ from crosscheck2d.adapters.engine import NOT_READABLE, PASSED, ContactImpulse
 from crosscheck2d.adapters.float32 import must_fit, must_not_be_cut, rounding, vector
 from crosscheck2d.adapters.friction import of_shapes
 from crosscheck2d.adapters.library_versions import version
-from crosscheck2d.adapters.matched import Searched
+from crosscheck2d.adapters.matched import read_searched
 from crosscheck2d.scenarios.model import Array, Scene, State
 
 SHIPPED: dict[str, Any] = {
@@ -29,82 +28,13 @@ SHIPPED: dict[str, Any] = {
     "continuous": True,
     "bullet": False,
 }
-MATCHED: dict[str, Any] = {
-    "length_unit": 0.3,
-    "substeps": 4,
-    "hertz": 120.0,
-    "damping_ratio": 1.0,
-    "push_speed": 3.0,
-    "restitution_threshold": 0.0,
-    "continuous": True,
-    "bullet": False,
-}
-"""What the profiles choose: `length_unit` in smallest radii; `hertz`, `damping_ratio` and
-`push_speed` (m/s) are of the contacts. `adapters/matched.csv` holds what else was tried."""
-
-SEARCHED = Searched(
-    MATCHED,
-    {
-        "length_unit": (
-            (0.02, 0.1, 0.3, 0.5, 0.7, 1.0, 2.0),
-            (
-                "smallest radii; sets slop (0.005 units) and the margin in which contacts are"
-                " foreseen (0.02 units)"
-            ),
-        ),
-        "substeps": ((1, 2, 4, 8), "of a step; the manual has 4"),
-        "hertz": (
-            (10.0, 30.0, 120.0, 1e6),
-            "stiffness of a contact; 30 by default; cut at an eighth of the substeps a second",
-        ),
-        "damping_ratio": ((0.1, 0.3, 1.0, 3.0, 10.0, 30.0), "of a contact; 10 by default"),
-        "push_speed": (
-            (0.0, 0.3, 3.0, 30.0),
-            "m/s, at most, of a position correction; 3 by default",
-        ),
-        "continuous": (
-            (False, True),
-            "continuous collision with walls and static disks; on by default",
-        ),
-        "bullet": ((False, True), "the same between disks that move, where `continuous` is on"),
-    },
-    (
-        (("length_unit", "hertz"), (0.02, 0.3, 0.5), (30.0, 1e6)),
-        (("substeps", "hertz"), (2, 8), (30.0, 1e6)),
-        (("hertz", "damping_ratio"), (30.0, 1e6), (1.0, 3.0)),
-    ),
-    {
-        "restitution_threshold": "0: as the scene states",
-        "maximum_linear_speed": "1e9 m/s: no speed is cut",
-        "allowFastRotation, warm starting, speculative contacts": (
-            "in the header of Box2D 3.1; pyb2d3 does not hand them on"
-        ),
-        "linear slop, speculative margin": "compiled into Box2D; moved by the length unit alone",
-        "joint tuning": "no joints here",
-        "walls of chains or boxes": "a chain is one-sided, a segment of the scene is not",
-        "friction": "as the scene states: that of a pair is the root of the product",
-        "damping, sleeping": "0 and off: as the scene states",
-        "thread_pool": "changes the time alone",
-    },
-)
-
+MATCHED = read_searched("box2d_v3").chosen
 SPIN_CAP = (
     "an eighth of a turn, without b2BodyDef::allowFastRotation of Box2D 3.1, which pyb2d3 does not"
     " hand on"
 )
 # it is global to the process: threads take turns, so that each world gets its own unit
 LENGTH_UNIT = Lock()
-
-
-def in_its_unit(method: Callable[..., None]) -> Callable[..., None]:
-    # Decorator for a method that sets the length unit and needs it until it returns.
-
-    @wraps(method)
-    def alone(*arguments: Any, **named: Any) -> None:
-        with LENGTH_UNIT:
-            method(*arguments, **named)
-
-    return alone
 
 
 class Box2DV3:
@@ -114,8 +44,8 @@ class Box2DV3:
     `matched`: no sleep, restitution threshold or speed cap. The length unit is 0.3 of the smallest
     radius: slop and speculative margin are fractions of it; a larger margin predicts more
     collisions, and makes spurious ones of disks that pass each other. Contacts are stiffer, and
-    damped less, than by default. The values are `MATCHED`, by `crosscheck tune`. A scene that
-    reaches the cap on spins, which pyb2d3 cannot lift, is refused.
+    damped less, than by default. The values are those of matched.toml, by `crosscheck tune`. A
+    scene that reaches the cap on spins, which pyb2d3 cannot lift, is refused.
 
     Changed one at a time by `options.py`, `table.py` and `crosscheck tune`: `sleeping` (None: the
     profile's), `turning` (False: no inertia, so no spin), `friction` (None: as above); `settings`
@@ -140,8 +70,11 @@ class Box2DV3:
         self.tuning = tuned(self.chosen)
         self.sleeping = not self.matched if sleeping is None else sleeping
 
-    @in_its_unit
     def load(self, scene: Scene, dt: float) -> None:
+        with LENGTH_UNIT:
+            self._load(scene, dt)
+
+    def _load(self, scene: Scene, dt: float) -> None:
         must_fit(scene)
         self.scene, self.dt, self.steps = scene, dt, 0
         self.friction = of_shapes(scene, self.matched, self.asked_friction)
@@ -166,24 +99,17 @@ class Box2DV3:
             self.every.append(body)
         for w in range(len(scene.walls)):
             self._wall(w)
-        self.angle, self.spin, self.seen = (
-            np.array(scene.angle),
-            np.array(scene.angular_velocity),
-            0,
-        )
+        self.angle, self.spin = np.array(scene.angle), np.array(scene.angular_velocity)
+        self.seen = 0
 
     def _options(self) -> dict[str, float]:
-        given: dict[str, float] = {}
+        given, names = dict[str, float](), ("restitution_threshold", "maximum_linear_speed")
         if self.matched:
             given = {"maximum_linear_speed": 1e9}
         elif "length_unit" in self.chosen:  # which would scale these, too
-            given = {"maximum_linear_speed": 400.0, "restitution_threshold": 1.0}
+            given = dict(zip(names, (1.0, 400.0)))
         given = given | self.chosen
-        return {
-            name: given[name]
-            for name in ("restitution_threshold", "maximum_linear_speed")
-            if name in given
-        }
+        return {name: given[name] for name in names if name in given}
 
     def _shape(self) -> Any:
         friction = {} if self.friction is None else {"friction": self.friction}
@@ -225,18 +151,18 @@ class Box2DV3:
         self.bodies[disk].apply_force_to_center(vector(force))
         self.bodies[disk].apply_torque(float(torque))
 
-    @in_its_unit
     def step(self, count: int = 1) -> None:
-        pyb2d3.set_length_units_per_meter(self.unit)  # another world may have changed it since
-        for _ in range(count):
-            self.world.step(self.dt, self.substeps)
-            if self.listening:
-                self._listen()
-            self.steps += 1
-            if self.scene.wrap is not None:
-                started = perf_counter()
-                self._wrap()
-                self.wrapping += perf_counter() - started
+        with LENGTH_UNIT:
+            pyb2d3.set_length_units_per_meter(self.unit)  # another world may have changed it since
+            for _ in range(count):
+                self.world.step(self.dt, self.substeps)
+                if self.listening:
+                    self._listen()
+                self.steps += 1
+                if self.scene.wrap is not None:
+                    started = perf_counter()
+                    self._wrap()
+                    self.wrapping += perf_counter() - started
 
     def _listen(self) -> None:
         for collision in self.world.get_contact_events().hit_events():

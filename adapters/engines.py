@@ -3,7 +3,7 @@ row."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from importlib import import_module
@@ -23,7 +23,7 @@ from crosscheck2d.adapters.engine_row import (
 )
 from crosscheck2d.adapters.library_at_version import FORM, LibraryAtVersion
 from crosscheck2d.adapters.library_versions import BOX2D
-from crosscheck2d.adapters.matched import Searched
+from crosscheck2d.adapters.matched import read_searched
 from crosscheck2d.scenarios.model import Scene
 
 
@@ -40,82 +40,35 @@ def _reference(variant: str, **settings: Any) -> Engine:
     return _made("crosscheck2d.adapters.reference.Reference", solver, **settings)
 
 
-def _searched(module: str) -> Searched:
-    searched: Searched = import_module(module).SEARCHED
-    return searched
-
-
-def _javascript_searched(name: str) -> Searched:
-    from crosscheck2d.adapters.host.searched import searched_of
-
-    return searched_of(name)
-
-
-def _javascript(name: str, profile: str, **settings: Any) -> Engine:
-    package = (FETCHED | NAMED)[f"{name}:{profile}"].package
-    return _made(
-        "crosscheck2d.adapters.host.engine.PackageEngine", name, package, profile, **settings
-    )
-
-
 def _what_moves_is_a_bullet(engine: Any) -> None:
     # For Box2D 3.1: make the moving disks bullets; bullets do not detect each other.
     for body, velocity in zip(engine.bodies, engine.scene.velocity):
         body.bullet = bool(velocity.any())
 
 
-# The fields that all profiles of an engine share.
-_Reference = partial(EngineRow, mark=Mark("#0a4f9e", "#6cb8ff", "circle"))
-_Pymunk = partial(
-    EngineRow,
-    outside=True,
-    distributions=("pymunk",),
-    wheel="pymunk",
-    mark=Mark("#d1540a", "#ff9a4d", "triangle-up"),
-    searched=partial(_searched, "crosscheck2d.adapters.pymunk"),
-    work=AccuracyParameter("iterations", "iterations", (1, 2, 5, 10, 20, 50, 100, 200)),
-)
-_Box2D = partial(
-    EngineRow,
-    outside=True,
-    distributions=(BOX2D,),
-    wheel="box2d",
-    mark=Mark("#00876c", "#5be0b5", "square"),
-    searched=partial(_searched, "crosscheck2d.adapters.box2d"),
-    work=AccuracyParameter("iterations", "velocity_iterations", (1, 2, 4, 8, 16, 32, 64)),
-)
-_Box2DV3 = partial(
-    EngineRow,
-    outside=True,
-    distributions=("pyb2d3",),
-    wheel="pyb2d3",
-    mark=Mark("#b84fb0", "#c46bd8", "diamond"),
-    searched=partial(_searched, "crosscheck2d.adapters.box2d_v3"),
-    work=AccuracyParameter("substeps", "substeps", (1, 2, 4, 8, 16)),
-)
-_Planck = partial(
-    EngineRow,
-    outside=True,
-    package="planck",
-    mark=Mark("#6940da", "#8472fe", "triangle-right"),
-    searched=partial(_javascript_searched, "planck"),
-)
-_Matter = partial(
-    EngineRow,
-    outside=True,
-    package="matter-js",
-    mark=Mark("#ec4f90", "#e39bcd", "star-diamond"),
-    searched=partial(_javascript_searched, "matter"),
-)
-_Rapier = partial(
-    EngineRow,
-    outside=True,
-    package="@dimforge/rapier2d-compat",
-    mark=Mark("#6d9154", "#8cf078", "diamond-wide"),
-    searched=partial(_javascript_searched, "rapier2d"),
-)
-_Box2DWasm = partial(EngineRow, outside=True, package="box2d3-wasm")
-SHIPPED = (6, 3)  # the dash of every profile of this name
+def _profiles(
+    engine: str,
+    make: Callable[..., Engine],
+    shipped: str,
+    matched: str,
+    *,
+    of_shipped: dict[str, Any] | None = None,
+    of_matched: dict[str, Any] | None = None,
+    **shared: Any,
+) -> dict[str, EngineRow]:
+    # The two rows of a library: `make` takes the profile; shipped, matched: their summaries; then
+    # the fields of one row, and those of both.
+    rows = {
+        "shipped": {"summary": shipped, "dash": (6, 3)} | (of_shipped or {}),
+        "matched": {"summary": matched} | (of_matched or {}),
+    }
+    return {
+        f"{engine}:{profile}": EngineRow(partial(make, profile), outside=True, **shared, **row)
+        for profile, row in rows.items()
+    }
+
+
+_Reference = partial(EngineRow, rounding=FLOAT64, mark=Mark("#0a4f9e", "#6cb8ff", "circle"))
 
 ENGINES: dict[str, EngineRow] = {
     "reference:exercise": _Reference(
@@ -123,14 +76,12 @@ ENGINES: dict[str, EngineRow] = {
         "hand-written, exercise 11: symplectic Euler; 171 lines, tests every pair, sets a disk that"
         " leaves a torus onto its edge",
         1.0,
-        FLOAT64,
         options={"kept in float32": {"precision": np.float32}},
     ),
     "reference:neighbours": _Reference(
         partial(_reference, "neighbours"),
-        "same bits as reference:exercise in less time: 610 lines, no pair tested that is far",
+        "same bits as reference:exercise in less time: 597 lines, no pair tested that is far",
         1.0,
-        FLOAT64,
         dash=(7, 5),
         shape="x",
         bits_of="reference:exercise",
@@ -139,14 +90,12 @@ ENGINES: dict[str, EngineRow] = {
         partial(_reference, "lesson"),
         "hand-written, the lesson: explicit Euler; 126 lines, tests every pair",
         0.0,
-        FLOAT64,
         dash=(2, 3),
     ),
     "reference:coulomb": _Reference(
         partial(_reference, "coulomb"),
         "hand-written, the exercise with friction; 89 lines, tests every pair",
         1.0,
-        FLOAT64,
         dash=(12, 3),
         shape="triangle-left",
         bits_of="reference:exercise",
@@ -156,80 +105,85 @@ ENGINES: dict[str, EngineRow] = {
         partial(_reference, "ordered"),
         "hand-written: exact flight, time-of-impact ordering, friction; 925 lines, no projection",
         0.5,
-        FLOAT64,
         dash=(9, 3, 2, 3),
         shape="hourglass",
         orders_collisions=True,
     ),
-    "pymunk:shipped": _Pymunk(
-        partial(_made, "crosscheck2d.adapters.pymunk.Pymunk", "shipped"),
+    **_profiles(
+        "pymunk",
+        partial(_made, "crosscheck2d.adapters.pymunk.Pymunk"),
         "pymunk 7.3 (float64), own defaults: elasticity e on every shape",
-        0.0,
-        FLOAT64,
-        dash=SHIPPED,
-    ),
-    "pymunk:matched": _Pymunk(
-        partial(_made, "crosscheck2d.adapters.pymunk.Pymunk", "matched"),
         "pymunk, matched: elasticity sqrt(e), small slop",
-        0.0,
-        FLOAT64,
-        options={
-            "50 iterations, not 10": {"iterations": 50},
-            "200 iterations, not 10": {"iterations": 200},
-            "sleeping": {"sleep_time_threshold": 0.5},
-            "no rotation": {"turning": False},
-            "hash, not tree": {"spatial_hash": (0.6, 1000)},
-        },
-        variants={
-            "fifty_iterations": Variant({"iterations": 50}, "50 iterations instead of 10"),
-            "no_correction": Variant({"collision_bias": 1.0}, "no position correction"),
+        alpha=0.0,
+        rounding=FLOAT64,
+        distributions=("pymunk",),
+        wheel="pymunk",
+        mark=Mark("#d1540a", "#ff9a4d", "triangle-up"),
+        searched=partial(read_searched, "pymunk"),
+        work=AccuracyParameter("iterations", "iterations", (1, 2, 5, 10, 20, 50, 100, 200)),
+        of_matched={
+            "options": {
+                "50 iterations, not 10": {"iterations": 50},
+                "200 iterations, not 10": {"iterations": 200},
+                "sleeping": {"sleep_time_threshold": 0.5},
+                "no rotation": {"turning": False},
+                "hash, not tree": {"spatial_hash": (0.6, 1000)},
+            },
+            "variants": {
+                "fifty_iterations": Variant({"iterations": 50}, "50 iterations instead of 10"),
+                "no_correction": Variant({"collision_bias": 1.0}, "no position correction"),
+            },
         },
     ),
-    "box2d:shipped": _Box2D(
-        partial(_made, "crosscheck2d.adapters.box2d.Box2DEngine", "shipped"),
+    **_profiles(
+        "box2d",
+        partial(_made, "crosscheck2d.adapters.box2d.Box2DEngine"),
         "box2d-py 2.3.8 (float32), own defaults: friction, sleep, threshold 1 m/s",
-        1.0,
-        FLOAT32,
-        dash=SHIPPED,
-    ),
-    "box2d:matched": _Box2D(
-        partial(_made, "crosscheck2d.adapters.box2d.Box2DEngine", "matched"),
         "box2d-py, matched: units that lift its thresholds; CCD; no sleep; friction as stated",
-        1.0,
-        FLOAT32,
-        options={
-            "1 iteration, not 8": {"velocity_iterations": 1},
-            "30 iterations, not 8": {"velocity_iterations": 30},
-            "no position correction": {"position_iterations": 0},
-            "no CCD": {"continuous": False, "bullet": False},
-            "sleeping": {"sleeping": True},
-            "no warm start": {"warm_starting": False},
-            "no rotation": {"turning": False},
+        alpha=1.0,
+        rounding=FLOAT32,
+        distributions=(BOX2D,),
+        wheel="box2d",
+        mark=Mark("#00876c", "#5be0b5", "square"),
+        searched=partial(read_searched, "box2d"),
+        work=AccuracyParameter("iterations", "velocity_iterations", (1, 2, 4, 8, 16, 32, 64)),
+        of_matched={
+            "options": {
+                "1 iteration, not 8": {"velocity_iterations": 1},
+                "30 iterations, not 8": {"velocity_iterations": 30},
+                "no position correction": {"position_iterations": 0},
+                "no CCD": {"continuous": False, "bullet": False},
+                "sleeping": {"sleeping": True},
+                "no warm start": {"warm_starting": False},
+                "no rotation": {"turning": False},
+            }
         },
     ),
-    "box2d_v3:shipped": _Box2DV3(
-        partial(_made, "crosscheck2d.adapters.box2d_v3.Box2DV3", "shipped"),
+    **_profiles(
+        "box2d_v3",
+        partial(_made, "crosscheck2d.adapters.box2d_v3.Box2DV3"),
         "Box2D 3.1 (pyb2d3, float32), own defaults: friction, sleep, threshold 1 m/s",
-        0.625,
-        FLOAT32,
-        dash=SHIPPED,
-    ),
-    "box2d_v3:matched": _Box2DV3(
-        partial(_made, "crosscheck2d.adapters.box2d_v3.Box2DV3", "matched"),
         "Box2D 3.1, matched: no thresholds, length unit 0.3 r, stiffer contacts; CCD",
-        0.625,
-        FLOAT32,
-        options={
-            "1 substep, not 4": {"substeps": 1},
-            "16 substeps, not 4": {"substeps": 16},
-            "no CCD": {"continuous": False},
-            "all bullets": {"bullet": True},
-            "sleeping": {"sleeping": True},
-            "no rotation": {"turning": False},
-        },
-        variants={
-            "bullets": Variant({}, "moving disks are bullets", _what_moves_is_a_bullet),
-            "16_substeps": Variant({"substeps": 16}, "16 substeps instead of 4"),
+        alpha=0.625,
+        rounding=FLOAT32,
+        distributions=("pyb2d3",),
+        wheel="pyb2d3",
+        mark=Mark("#b84fb0", "#c46bd8", "diamond"),
+        searched=partial(read_searched, "box2d_v3"),
+        work=AccuracyParameter("substeps", "substeps", (1, 2, 4, 8, 16)),
+        of_matched={
+            "options": {
+                "1 substep, not 4": {"substeps": 1},
+                "16 substeps, not 4": {"substeps": 16},
+                "no CCD": {"continuous": False},
+                "all bullets": {"bullet": True},
+                "sleeping": {"sleeping": True},
+                "no rotation": {"turning": False},
+            },
+            "variants": {
+                "bullets": Variant({}, "moving disks are bullets", _what_moves_is_a_bullet),
+                "16_substeps": Variant({"substeps": 16}, "16 substeps instead of 4"),
+            },
         },
     ),
     "event_driven:float64": EngineRow(
@@ -247,71 +201,63 @@ DISTINCT = {name: row for name, row in ENGINES.items() if not row.bits_of}
 # the engines that play by default: those, and the ones that differ from them with friction
 UNASKED = {name: row for name, row in ENGINES.items() if name in DISTINCT or row.adds_friction}
 
-# Rounding of matter's velocities, which are differences of two positions: at 5 m they are known to
-# 1e-15 m, of a path in a step of some 1e-4 m.
-VERLET = 2.0**-36
+PACKAGE = "crosscheck2d.adapters.host.engine.PackageEngine"
 # Engines in npm packages, which the extra `js` fetches once; they play on request.
 FETCHED: dict[str, EngineRow] = {
-    "planck:shipped": _Planck(
-        partial(_javascript, "planck", "shipped"),
+    **_profiles(
+        "planck",
+        partial(_made, PACKAGE, "planck", "planck"),
         "planck 1.5, own defaults: Box2D 2.3 in JavaScript and float64",
-        1.0,
-        FLOAT64,
-        dash=SHIPPED,
-    ),
-    "planck:matched": _Planck(
-        partial(_javascript, "planck", "matched"),
         "planck, matched: CCD, also between disks, to 1e-7 of a radius; no thresholds, no sleep",
-        1.0,
-        FLOAT64,
+        alpha=1.0,
+        rounding=FLOAT64,
+        package="planck",
+        mark=Mark("#6940da", "#8472fe", "triangle-right"),
+        searched=partial(read_searched, "planck"),
     ),
-    "matter:shipped": _Matter(
-        partial(_javascript, "matter", "shipped"),
+    **_profiles(
+        "matter",
+        partial(_made, PACKAGE, "matter", "matter-js"),
         "matter-js 0.20 (float64), own defaults: 100 pixels a metre, disks are polygons, air",
-        1.0,
-        VERLET,
-        dash=SHIPPED,
-        departs=dict.fromkeys(
-            ("steps_obey_dt", "force_lasts_one_step", "same_instant"),
-            "friction of the air: 1 % of the speed in 1/60 s, its default",
-        ),
-    ),
-    "matter:matched": _Matter(
-        partial(_javascript, "matter", "matched"),
         "matter-js, matched: pixels that lift its thresholds, 200 sides, no air",
-        1.0,
-        VERLET,
+        alpha=1.0,
+        # of velocities, which are differences of two positions: at 5 m they are known to 1e-15 m,
+        # of a path in a step of some 1e-4 m
+        rounding=2.0**-36,
+        package="matter-js",
+        mark=Mark("#ec4f90", "#e39bcd", "star-diamond"),
+        searched=partial(read_searched, "matter"),
+        of_shipped={
+            "departs": dict.fromkeys(
+                ("steps_obey_dt", "force_lasts_one_step", "same_instant"),
+                "friction of the air: 1 % of the speed in 1/60 s, its default",
+            )
+        },
     ),
-    "rapier2d:shipped": _Rapier(
-        partial(_javascript, "rapier2d", "shipped", float32=True),
+    **_profiles(
+        "rapier2d",
+        partial(_made, PACKAGE, "rapier2d", "@dimforge/rapier2d-compat", float32=True),
         "Rapier 0.21 (WebAssembly, float32), own defaults: friction, sleep, length unit 1 m",
-        0.625,
-        FLOAT32,
-        dash=SHIPPED,
-    ),
-    "rapier2d:matched": _Rapier(
-        partial(_javascript, "rapier2d", "matched", float32=True),
         "Rapier, matched: length unit r / 2, no friction, no sleep",
-        0.625,
-        FLOAT32,
+        alpha=0.625,
+        rounding=FLOAT32,
+        package="@dimforge/rapier2d-compat",
+        mark=Mark("#6d9154", "#8cf078", "diamond-wide"),
+        searched=partial(read_searched, "rapier2d"),
     ),
 }
 
 # An engine that plays only where it is named: no table or page has its results.
 NAMED: dict[str, EngineRow] = {
-    "box2d_wasm:shipped": _Box2DWasm(
-        partial(_javascript, "box2d_wasm", "shipped", float32=True),
+    **_profiles(
+        "box2d_wasm",
+        partial(_made, PACKAGE, "box2d_wasm", "box2d3-wasm", float32=True),
         "Box2D after 3.1 (box2d3-wasm 5.2, float32), own defaults, as box2d_v3:shipped",
-        0.625,
-        FLOAT32,
-        dash=SHIPPED,
-    ),
-    "box2d_wasm:matched": _Box2DWasm(
-        partial(_javascript, "box2d_wasm", "matched", float32=True),
         "Box2D after 3.1, matched as box2d_v3 is; allowFastRotation: no cap on spins",
-        0.625,
-        FLOAT32,
-    ),
+        alpha=0.625,
+        rounding=FLOAT32,
+        package="box2d3-wasm",
+    )
 }
 
 OWN = ":own"  # the profile of a solver's file; its engine is the path

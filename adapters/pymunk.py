@@ -11,7 +11,7 @@ import pymunk
 
 from crosscheck2d.adapters.advance import onto_torus
 from crosscheck2d.adapters.engine import NO_SUCH, ContactImpulse
-from crosscheck2d.adapters.matched import GEOMETRY, Searched
+from crosscheck2d.adapters.matched import read_searched
 from crosscheck2d.scenarios.model import Array, Scene, State
 
 try:
@@ -20,51 +20,11 @@ except ImportError:  # before pymunk 6.6
     batch = None  # type: ignore[assignment]
 
 OF_SHAPES = ("elasticity", "friction")  # the engine multiplies the two of a pair
-DEFAULT_BIAS = (1 - 0.1) ** 60
-MATCHED: dict[str, Any] = {
-    "iterations": 10,
-    "slop": 1e-6,
-    "bias": 1e-24,
-    "elastic_bias": 0.0,
-    "persistence": 1,
-}
-"""What `matched` chooses: `slop` in smallest radii; the biases are what is left of an overlap after
-1 s, at e < 1 and at e = 1. `adapters/matched.csv` holds what else was tried."""
-
-SEARCHED = Searched(
-    MATCHED,
-    {
-        "iterations": ((5, 10, 20, 50), "passes of the impulse solver; 10 by default"),
-        "slop": (
-            (0.01, 1e-3, 1e-4, 1e-6, 0.0),
-            "overlap left alone, in smallest radii; 0.1 m by default",
-        ),
-        "bias": (
-            (1.0, 0.3, DEFAULT_BIAS, 1e-12, 1e-24, 1e-36, 1e-48, 0.0),
-            "share of an overlap that is left after 1 s, at e < 1; 0.0018 by default",
-        ),
-        "elastic_bias": ((1.0, 0.3, DEFAULT_BIAS, 1e-24, 0.0), "the same at e = 1"),
-        "persistence": (
-            (1, 2, 3),
-            "steps for which a lost contact keeps its impulses; 3 by default",
-        ),
-    },
-    (
-        (("bias", "elastic_bias"), (1e-12, 1e-24, 1e-36, 0.0), (1.0, DEFAULT_BIAS, 1e-24, 0.0)),
-        (("slop", "bias"), (1e-2, 1e-3, 1e-4, 0.0), (DEFAULT_BIAS, 1e-12, 1e-24, 1e-48, 0.0)),
-        (("slop", "elastic_bias"), (1e-3, 0.0), (DEFAULT_BIAS, 1e-24, 0.0)),
-        (("iterations", "bias"), (5, 20), (1e-24, 0.0)),
-    ),
-    {
-        "elasticity": "sqrt(e) on every shape: the engine multiplies two",
-        "shape radius of a wall": GEOMETRY,
-        "position_func, velocity_func": "Python code in place of the engine's own integrator",
-        "pre_solve callbacks": "Python code in place of the engine's own collision law",
-        "friction": "its root on every shape: the engine multiplies two",
-        "damping, sleep_time_threshold": "1 and none by default: as the scene states",
-        "use_spatial_hash, threads": "change only the time: see the options of crosscheck speed",
-    },
+OF_SPACE = (
+    *("iterations", "collision_slop", "collision_bias", "collision_persistence", "damping"),
+    "sleep_time_threshold",
 )
+MATCHED = read_searched("pymunk").chosen
 
 
 class Pymunk:
@@ -95,11 +55,8 @@ class Pymunk:
     ) -> None:
         self.matched = profile == "matched"
         self.turning, self.spatial_hash = turning, spatial_hash
-        self.chosen = (
-            {name: settings.pop(name, value) for name, value in MATCHED.items()}
-            if self.matched
-            else {}
-        )
+        matched = MATCHED if self.matched else {}
+        self.chosen = {name: settings.pop(name, value) for name, value in matched.items()}
         self.changed = settings
 
     def load(self, scene: Scene, dt: float) -> None:
@@ -225,17 +182,7 @@ class Pymunk:
             "restitution of a pair": shape.elasticity**2,
             "friction": shape.friction,
             "friction of a pair": shape.friction**2,
-            **{
-                name: getattr(self.space, name, NO_SUCH)
-                for name in (
-                    "iterations",
-                    "collision_slop",
-                    "collision_bias",
-                    "collision_persistence",
-                    "damping",
-                    "sleep_time_threshold",
-                )
-            },
+            **{name: getattr(self.space, name, NO_SUCH) for name in OF_SPACE},
         }
         return {name: (self.asked.get(name), value) for name, value in resolved.items()}
 

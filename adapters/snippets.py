@@ -4,10 +4,10 @@ binding that was run."""
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from contextlib import closing
-from string import Template
 from typing import Any
+
+from jinja2 import Environment, StrictUndefined
 
 from crosscheck2d.adapters.engines import row_of
 from crosscheck2d.adapters.friction import of_shapes
@@ -17,24 +17,26 @@ PYMUNK = """\
 import pymunk
 
 space = pymunk.Space()
-space.gravity = $gravity
-$settings
+space.gravity = {{ gravity }}
+{% for name, value in engine.asked.items() if name not in ("elasticity", "friction") %}
+space.{{ name }} = {{ value }}
+{% endfor %}
 
 def add_disk(position, velocity, radius, mass):
     body = pymunk.Body(mass, mass * radius**2 / 2)
     body.position, body.velocity = position, velocity
     shape = pymunk.Circle(body, radius)
-    shape.elasticity, shape.friction = $elasticity, $friction
+    shape.elasticity, shape.friction = {{ engine.asked.elasticity }}, {{ engine.asked.friction }}
     space.add(body, shape)
     return body
 
 def add_wall(start, end):
     shape = pymunk.Segment(space.static_body, start, end, 0.0)
-    shape.elasticity, shape.friction = $elasticity, $friction
+    shape.elasticity, shape.friction = {{ engine.asked.elasticity }}, {{ engine.asked.friction }}
     space.add(shape)
 
 def step():
-    space.step($dt)
+    space.step({{ dt }})
 
 def position(body):
     return tuple(body.position)
@@ -42,23 +44,24 @@ def position(body):
 BOX2D = """\
 import Box2D
 
-length, time = $length, $time  # units of length in a metre, s in a unit of time
+length = {{ engine.length }}  # units of length in a metre
+time = {{ engine.time }}  # s in a unit of time
 speed = length * time
-x, y = $gravity
+x, y = {{ gravity }}
 world = Box2D.b2World(gravity=(x * speed * time, y * speed * time))
-world.continuousPhysics = $continuous
-world.subStepping = $sub_stepping
-world.warmStarting = $warm_starting
-world.SetAllowSleeping($sleeping)  # the attribute doSleep does not reach the engine
-surface = {"restitution": $restitution$friction}
+world.continuousPhysics = {{ engine.continuous }}
+world.subStepping = {{ engine.chosen.sub_stepping }}
+world.warmStarting = {{ engine.chosen.warm_starting }}
+world.SetAllowSleeping({{ engine.sleeping }})  # the attribute doSleep does not reach the engine
+surface = {{ surface }}
 
 def add_disk(position, velocity, radius, mass):
     (x, y), (u, v) = position, velocity
     body = world.CreateDynamicBody(
         position=(x * length, y * length),
         linearVelocity=(u * speed, v * speed),
-        allowSleep=$sleeping,
-        bullet=$bullet,
+        allowSleep={{ engine.sleeping }},
+        bullet={{ engine.bullet }},
     )
     shape = Box2D.b2CircleShape(radius=radius * length)
     body.CreateFixture(Box2D.b2FixtureDef(shape=shape, density=1.0, **surface))
@@ -68,11 +71,14 @@ def add_disk(position, velocity, radius, mass):
 
 def add_wall(start, end):
     ends = [(x * length, y * length) for x, y in (start, end)]
-    shape = Box2D.b2EdgeShape(vertices=ends)$skin
+    shape = Box2D.b2EdgeShape(vertices=ends)
+{% if not engine.chosen.skin %}
+    shape.radius = 0.0
+{% endif %}
     world.CreateStaticBody().CreateFixture(Box2D.b2FixtureDef(shape=shape, **surface))
 
 def step():
-    world.Step($dt / time, $velocity_iterations, $position_iterations)
+    world.Step({{ dt }} / time, {{ engine.velocity_iterations }}, {{ engine.position_iterations }})
 
 def position(body):
     x, y = body.position
@@ -81,16 +87,19 @@ def position(body):
 BOX2D_V3 = """\
 import pyb2d3
 
-pyb2d3.set_length_units_per_meter($unit)
-world = pyb2d3.World(gravity=$gravity$options)
-world.continuous_enabled = $continuous
-world.sleeping_enabled = $sleeping
-world.set_contact_tuning($tuning)  # hertz, damping ratio, push speed
-material = pyb2d3.surface_material(restitution=$restitution$friction)
+pyb2d3.set_length_units_per_meter({{ engine.unit }})
+world = pyb2d3.World(gravity={{ gravity }}
+{%- for name, value in engine.options.items() %}, {{ name }}={{ value }}{% endfor %})
+world.continuous_enabled = {{ engine.chosen.continuous }}
+world.sleeping_enabled = {{ engine.sleeping }}
+world.set_contact_tuning{{ engine.tuning }}  # hertz, damping ratio, push speed
+surface = {{ surface }}
+material = pyb2d3.surface_material(**surface)
 
 def add_disk(position, velocity, radius, mass):
     body = world.create_dynamic_body(
-        position=position, linear_velocity=velocity, enable_sleep=$sleeping, is_bullet=$bullet
+        position=position, linear_velocity=velocity,
+        enable_sleep={{ engine.sleeping }}, is_bullet={{ engine.chosen.bullet }},
     )
     shape = pyb2d3.shape_def(density=1.0, material=material)
     body.create_circle_shape(shape, pyb2d3.circle(radius=radius))
@@ -104,7 +113,7 @@ def add_wall(start, end):
     world.create_static_body().create_segment_shape(shape, pyb2d3.segment(start, end))
 
 def step():
-    world.step($dt, $substeps)
+    world.step({{ dt }}, {{ engine.substeps }})
 
 def position(body):
     return tuple(body.position)
@@ -112,47 +121,62 @@ def position(body):
 PLANCK = """\
 import * as planck from "planck";
 
-Object.assign(planck.Settings, $settings);
-const [x, y] = $gravity;
-const world = new planck.World({
-  gravity: { x, y }, allowSleep: $sleeping,
-  continuousPhysics: $continuous, warmStarting: $warm_starting,
+Object.assign(planck.Settings, {
+{% for name in ("linearSlop", "maxLinearCorrection", "maxTranslation", "maxRotation",
+                "aabbExtension", "baumgarte", "velocityThreshold") %}
+  {{ name }}: {{ resolved[name] }},
+{% endfor %}
 });
-const surface = { density: 1, restitution: $restitution$friction };
+const [x, y] = {{ gravity }};
+const world = new planck.World({
+  gravity: { x, y }, allowSleep: {{ resolved.sleeping }},
+  continuousPhysics: {{ resolved["continuous collision"] }},
+  warmStarting: {{ resolved["warm starting"] }},
+});
+const surface = {{ surface }};
 
 function addDisk([x, y], [u, v], radius, mass) {
   const body = world.createBody({
-    type: "dynamic", position: { x, y }, linearVelocity: { x: u, y: v }, bullet: $bullet,
+    type: "dynamic", position: { x, y }, linearVelocity: { x: u, y: v },
+    bullet: {{ resolved["continuous collision between disks"] }},
   });
-  body.createFixture({ shape: new planck.Circle(radius), ...surface });
+  body.createFixture({ shape: new planck.Circle(radius), density: 1, ...surface });
   body.setMassData({ mass, center: { x: 0, y: 0 }, I: mass * radius ** 2 / 2 });
   return body;
 }
 
 function addWall([x0, y0], [x1, y1]) {
-  const shape = new planck.Edge({ x: x0, y: y0 }, { x: x1, y: y1 });$skin
+  const shape = new planck.Edge({ x: x0, y: y0 }, { x: x1, y: y1 });
+{% if matched %}
+  shape.m_radius = 0;
+{% endif %}
   world.createBody().createFixture({ shape, ...surface });
 }
 
-const step = () => world.step($dt, $iterations);
+const step = () => world.step({{ dt }}, {{ asked["velocity, position iterations"] }});
 const position = (body) => [body.getPosition().x, body.getPosition().y];
 """
 MATTER = """\
 import Matter from "matter-js";
 
-const scale = $scale;  // pixels in a metre
-const [x, y] = $gravity;
+const scale = {{ asked["pixels in a metre"] }};  // pixels in a metre
+const sides = {{ chosen.get("sides", 25) }};
+const [x, y] = {{ gravity }};
+{% set velocity, position = resolved["velocity, position iterations"].split(", ") %}
 const engine = Matter.Engine.create({
-  gravity: { x, y, scale: scale * 1e-6 }, enableSleeping: $sleeping,
-  positionIterations: $position_iterations, velocityIterations: $velocity_iterations,
+  gravity: { x, y, scale: scale * 1e-6 }, enableSleeping: {{ resolved.sleeping }},
+  positionIterations: {{ position }}, velocityIterations: {{ velocity }},
 });
-const surface = { restitution: $restitution$friction };
+const surface = {{ surface }};
+{% if matched %}
+surface.frictionAir = 0;
+{% endif %}
 
 function addDisk([x, y], [u, v], radius, mass) {
-  const body = Matter.Bodies.circle(x * scale, y * scale, radius * scale, { ...surface }, $sides);
+  const body = Matter.Bodies.circle(x * scale, y * scale, radius * scale, { ...surface }, sides);
   Matter.Body.setMass(body, mass);
   Matter.Body.setInertia(body, mass * radius ** 2 / 2 * scale ** 2);
-  body.deltaTime = $dt * 1000;
+  body.deltaTime = {{ dt }} * 1000;
   Matter.Body.setVelocity(body, { x: u * scale / 60, y: v * scale / 60 });  // pixels in 1/60 s
   Matter.Composite.add(engine.world, body);
   return body;
@@ -165,27 +189,43 @@ function addWall([x0, y0], [x1, y1]) {
   Matter.Composite.add(engine.world, Matter.Bodies.rectangle(...at, length, 1e-3, options));
 }
 
-const step = () => Matter.Engine.update(engine, $dt * 1000);
+const step = () => Matter.Engine.update(engine, {{ dt }} * 1000);
 const position = (body) => [body.position.x / scale, body.position.y / scale];
 """
 RAPIER = """\
 import RAPIER from "@dimforge/rapier2d-compat";
 
 await RAPIER.init();
-const [x, y] = $gravity;
+const [x, y] = {{ gravity }};
 const world = new RAPIER.World({ x, y });
-world.timestep = $dt;
-$settings
+world.timestep = {{ dt }};
+{% if matched %}
+world.lengthUnit = {{ resolved["length unit in m"] }};
+{% endif %}
+{% for name, key in (
+    ("numSolverIterations", "iterations"),
+    ("integrationParameters.numInternalPgsIterations", "pgs_iterations"),
+    ("integrationParameters.maxCcdSubsteps", "continuous_steps"),
+    ("integrationParameters.contact_natural_frequency", "hertz"),
+    ("integrationParameters.normalizedPredictionDistance", "prediction"),
+) if key in chosen %}
+world.{{ name }} = {{ chosen[key] }};
+{% else %}
+// all else is Rapier's default
+{% endfor %}
 
 function addShape(shape, body) {
-  shape.setRestitution($restitution).setDensity(0)$friction;
+  shape.setDensity(0).setRestitution({{ surface.restitution }});
+{% if surface.friction is defined %}
+  shape.setFriction({{ surface.friction }});
+{% endif %}
   world.createCollider(shape, body);
   return body;
 }
 
 function addDisk([x, y], [u, v], radius, mass) {
   const body = RAPIER.RigidBodyDesc.dynamic().setTranslation(x, y).setLinvel(u, v)
-    .setCanSleep($sleeping)
+    .setCanSleep({{ not matched }})
     .setAdditionalMassProperties(mass, { x: 0, y: 0 }, mass * radius ** 2 / 2);
   return addShape(RAPIER.ColliderDesc.ball(radius), world.createRigidBody(body));
 }
@@ -198,6 +238,14 @@ function addWall([x0, y0], [x1, y1]) {
 const step = () => world.step();
 const position = (body) => [body.translation().x, body.translation().y];
 """
+TEMPLATES = {
+    "pymunk": PYMUNK,
+    "box2d": BOX2D,
+    "box2d_v3": BOX2D_V3,
+    "planck": PLANCK,
+    "matter": MATTER,
+    "rapier2d": RAPIER,
+}
 
 
 def write_snippet(name: str, scene: Scene, dt: float) -> str:
@@ -206,119 +254,31 @@ def write_snippet(name: str, scene: Scene, dt: float) -> str:
     library, _, profile = name.partition(":")
     if library not in TEMPLATES:
         return ""
-    with closing(row_of(name).make()) as engine:
+    row, matched = row_of(name), profile == "matched"
+    write, comment = (json.dumps, "//") if row.package else (repr, "#")
+
+    def literal(value: Any) -> str:
+        return value if isinstance(value, str) else write(value)
+
+    made = Environment(
+        trim_blocks=True, keep_trailing_newline=True, undefined=StrictUndefined, finalize=literal
+    )
+    surface, friction = {"restitution": scene.restitution}, of_shapes(scene, matched, None)
+    if friction is not None:
+        surface["friction"] = friction
+    with closing(row.make()) as engine:
         engine.load(scene, dt)
-        template, fields = TEMPLATES[library]
         package, version = next(iter(engine.versions().items()))
-        python = template in (PYMUNK, BOX2D, BOX2D_V3)
-        words = {"dt": dt, "gravity": scene.gravity.tolist(), "restitution": scene.restitution}
-        words = {key: repr(value) if python else json.dumps(value) for key, value in words.items()}
-        words |= fields(engine)
-    comment = "#" if python else "//"
+        settings = engine.settings().items()
+        code = made.from_string(TEMPLATES[library]).render(
+            engine=engine,
+            asked={setting: asked for setting, (asked, _) in settings},
+            resolved={setting: used for setting, (_, used) in settings},
+            chosen=row.searched().chosen if matched and row.searched else {},
+            matched=matched,
+            dt=dt,
+            gravity=tuple(scene.gravity.tolist()),
+            surface=surface,
+        )
     note = f"{comment} {package} {version}, {profile}, for this scene at {dt * 1e3:.4g} ms a step"
-    return f"{note}\n" + Template(template).substitute(words)
-
-
-def _pymunk(engine: Any) -> dict[str, Any]:
-    of_space = {k: v for k, v in engine.asked.items() if k not in ("elasticity", "friction")}
-    lines = [f"space.{key} = {value!r}" for key, value in of_space.items()]
-    return {"settings": "\n".join(lines), "gravity": tuple(engine.scene.gravity.tolist())} | {
-        key: repr(engine.asked[key]) for key in ("elasticity", "friction")
-    }
-
-
-def _box2d(engine: Any) -> dict[str, Any]:
-    names = "length time continuous sleeping bullet velocity_iterations position_iterations"
-    return {name: getattr(engine, name) for name in names.split()} | {
-        "sub_stepping": engine.chosen["sub_stepping"],
-        "warm_starting": engine.chosen["warm_starting"],
-        "skin": "" if engine.chosen["skin"] else "\n    shape.radius = 0.0",
-        "friction": "" if engine.friction is None else f', "friction": {engine.friction!r}',
-    }
-
-
-def _box2d_v3(engine: Any) -> dict[str, Any]:
-    return {
-        "unit": engine.unit,
-        "options": "".join(f", {key}={value!r}" for key, value in engine.options.items()),
-        "tuning": ", ".join(map(repr, engine.tuning)),
-        "gravity": tuple(engine.scene.gravity.tolist()),
-        "continuous": engine.chosen["continuous"],
-        "bullet": engine.chosen["bullet"],
-        "friction": "" if engine.friction is None else f", friction={engine.friction!r}",
-        "sleeping": engine.sleeping,
-        "substeps": engine.substeps,
-    }
-
-
-def _read(engine: Any) -> tuple[dict[str, Any], dict[str, str]]:
-    resolved = {name: value for name, (_, value) in engine.settings().items()}
-    friction = of_shapes(engine.scene, engine.profile == "matched", None)
-    stated = "" if friction is None else f", friction: {json.dumps(friction)}"
-    return resolved, {"friction": stated}
-
-
-def _chosen(profile: str, library: str) -> Mapping[str, Any]:
-    searched = row_of(f"{library}:matched").searched
-    return searched().chosen if searched is not None and profile == "matched" else {}
-
-
-def _planck(engine: Any) -> dict[str, Any]:
-    resolved, common = _read(engine)
-    settings = "linearSlop maxLinearCorrection maxTranslation maxRotation aabbExtension baumgarte"
-    settings += " velocityThreshold"
-    return common | {
-        "settings": json.dumps({name: resolved[name] for name in settings.split()}),
-        "sleeping": json.dumps(resolved["sleeping"]),
-        "continuous": json.dumps(resolved["continuous collision"]),
-        "bullet": json.dumps(resolved["continuous collision between disks"]),
-        "warm_starting": json.dumps(resolved["warm starting"]),
-        "skin": "" if engine.profile == "shipped" else "\n  shape.m_radius = 0;",
-        "iterations": engine.settings()["velocity, position iterations"][0],
-    }
-
-
-def _matter(engine: Any) -> dict[str, Any]:
-    resolved, common = _read(engine)
-    velocity, position = resolved["velocity, position iterations"].split(", ")
-    if engine.profile == "matched":
-        common["friction"] += ", frictionAir: 0"
-    return common | {
-        "scale": json.dumps(engine.settings()["pixels in a metre"][0]),
-        "sleeping": json.dumps(resolved["sleeping"]),
-        "sides": _chosen(engine.profile, "matter").get("sides", 25),
-        "velocity_iterations": velocity,
-        "position_iterations": position,
-    }
-
-
-def _rapier2d(engine: Any) -> dict[str, Any]:
-    resolved, common = _read(engine)
-    names = {
-        "numSolverIterations": "iterations",
-        "integrationParameters.numInternalPgsIterations": "pgs_iterations",
-        "integrationParameters.maxCcdSubsteps": "continuous_steps",
-        "integrationParameters.contact_natural_frequency": "hertz",
-        "integrationParameters.normalizedPredictionDistance": "prediction",
-    }
-    chosen = _chosen(engine.profile, "rapier2d")
-    settings = {"lengthUnit": resolved["length unit in m"]} if chosen else {}
-    settings |= {name: chosen[key] for name, key in names.items() if key in chosen}
-    lines = [f"world.{name} = {json.dumps(value)};" for name, value in settings.items()]
-    matched = engine.profile == "matched"
-    friction = of_shapes(engine.scene, matched, None)
-    return common | {
-        "settings": "\n".join(lines) or "// all else is Rapier's default",
-        "friction": "" if friction is None else f".setFriction({json.dumps(friction)})",
-        "sleeping": json.dumps(not matched),
-    }
-
-
-TEMPLATES: dict[str, Any] = {
-    "pymunk": (PYMUNK, _pymunk),
-    "box2d": (BOX2D, _box2d),
-    "box2d_v3": (BOX2D_V3, _box2d_v3),
-    "planck": (PLANCK, _planck),
-    "matter": (MATTER, _matter),
-    "rapier2d": (RAPIER, _rapier2d),
-}
+    return f"{note}\n{code}"

@@ -102,10 +102,7 @@ def is_quiet(disks: Disks, world: World, near: NeighbourList, p: int) -> bool:
         return False
     if next_touching_wall(disks, world, near, 0) < near.found[WALLS]:
         return False
-    for e in range(near.found[EDGES]):
-        if outside(disks.position, near.edge[e], world):
-            return False
-    return True
+    return not any_outside(disks.position, near, world)
 
 
 @compiled
@@ -295,30 +292,20 @@ def next_touching_wall(disks: Disks, world: World, near: NeighbourList, b: int) 
 
 @inlined
 def wrap_near(disks: Disks, world: World, near: NeighbourList) -> None:
-    """Wrap the disks that are near an edge; all, where the list does not hold, as it does not with
-    a disk that was set onto the opposite edge."""
+    """Wrap the disks; with one that was set onto the opposite edge the list does not hold."""
     if not holds(near):
         wrap(disks.position, world)
-        return
-    x = disks.position
-    for e in range(near.found[EDGES]):
-        i = int(near.edge[e])
-        if not outside(x, i, world):
-            continue
-        for axis in range(2):
-            if x[i, axis] < world.low[axis]:
-                x[i, axis] = world.high[axis]
-            elif x[i, axis] > world.high[axis]:
-                x[i, axis] = world.low[axis]
+    elif any_outside(disks.position, near, world):
+        wrap(disks.position, world)
         near.length[SLACK] = -inf
 
 
 @kernel
-def outside(x, i: int, world: World) -> bool:
-    """Whether the centre of disk `i` is beyond an edge of the box."""
-    return (
-        x[i, 0] < world.low[0]
-        or x[i, 0] > world.high[0]
-        or x[i, 1] < world.low[1]
-        or x[i, 1] > world.high[1]
-    )
+def any_outside(x, near: NeighbourList, world: World) -> bool:
+    """Whether the centre of a disk that is near an edge of the box is beyond it."""
+    for e in range(near.found[EDGES]):
+        i = near.edge[e]
+        for axis in range(2):
+            if x[i, axis] < world.low[axis] or x[i, axis] > world.high[axis]:
+                return True
+    return False

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from crosscheck2d.adapters.conformance.contract import CONTRACT
-from crosscheck2d.adapters.conformance.laws import LAWS
-from crosscheck2d.adapters.conformance.physics import PHYSICS
+from crosscheck2d.adapters.conformance.physics import LAWS, PHYSICS
 from crosscheck2d.adapters.conformance.probe import Probe, ProbeReading
 from crosscheck2d.adapters.engine import NotLoaded, Unsupported
 from crosscheck2d.adapters.engine_row import EngineRow
@@ -59,17 +58,8 @@ def not_probed(
     name: str, what: str, why: str, verdict: Literal["breaks", "departs"] = "breaks"
 ) -> Finding:
     engine, profile = name.split(":")
-    return Finding(
-        engine,
-        profile,
-        "make",
-        "Does the engine answer?",
-        "no",
-        "yes",
-        0.0,
-        verdict,
-        f"{what}: {why}",
-    )
+    question, note = "Does the engine answer?", f"{what}: {why}"
+    return Finding(engine, profile, "make", question, "no", "yes", 0.0, verdict, note)
 
 
 def ask(engine: str, profile: str, name: str, row: EngineRow) -> Finding:
@@ -82,22 +72,13 @@ def ask(engine: str, profile: str, name: str, row: EngineRow) -> Finding:
     except Unsupported as refusal:
         reading, verdict = ProbeReading("refused", "an answer", note=str(refusal)), "not asked"
     except Exception as error:  # an engine may raise anything; the finding records it
-        reading, verdict = (
-            ProbeReading("raised", "an answer", note=f"{type(error).__name__}: {error}"),
-            "departs" if row.exercise else missed(name, row) if row.source else "breaks",
-        )
+        reading = ProbeReading("raised", "an answer", note=f"{type(error).__name__}: {error}")
+        verdict = "departs" if row.exercise else missed(name, row) if row.source else "breaks"
+    # `crosscheck check` says what a solver of the exercise breaks, whose e may be its own
+    departure = "" if verdict == "keeps" or row.exercise else reading.departure or ""
+    got, expected, bound, note, _ = reading
     return Finding(
-        engine,
-        profile,
-        name,
-        probe.asked,
-        reading.got,
-        reading.expected,
-        reading.bound,
-        verdict,
-        reading.note,
-        # `crosscheck check` says what a solver of the exercise breaks, whose e may be its own
-        "" if verdict == "keeps" or row.exercise else reading.departure or "",
+        engine, profile, name, probe.asked, got, expected, bound, verdict, note, departure
     )
 
 

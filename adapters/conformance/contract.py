@@ -16,6 +16,7 @@ import numpy as np
 
 from crosscheck2d.adapters.conformance.probe import (
     DT,
+    ROUNDINGS,
     Departure,
     Probe,
     ProbeReading,
@@ -38,9 +39,6 @@ from crosscheck2d.adapters.engine import Unsupported
 from crosscheck2d.adapters.engine_row import FLOAT32, EngineRow
 from crosscheck2d.adapters.run import fault_of
 from crosscheck2d.scenarios.model import Scene
-
-# a scale, an inverse mass, a product, a sum: the most roundings between a force and a velocity
-ROUNDINGS = 8
 
 
 def order_and_shapes(row: EngineRow) -> ProbeReading:

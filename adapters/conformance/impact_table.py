@@ -27,7 +27,6 @@ from crosscheck2d.adapters.conformance.probe import DT, scene_of
 from crosscheck2d.adapters.engine import Engine, Unsupported
 from crosscheck2d.adapters.engine_row import FLOAT32, EngineRow
 from crosscheck2d.adapters.engines import ENGINES, FETCHED
-from crosscheck2d.adapters.friction import Frictionless
 from crosscheck2d.scenarios.model import Array, Scene
 
 KEPT = Path(__file__).with_name("impact_table.csv")
@@ -237,11 +236,10 @@ def rows_of_table(name: str, row: EngineRow) -> list[dict[str, float | str]]:
                 numbers = read(column, engine, dt)
                 spread = (np.median(numbers), numbers.min(), numbers.max())
                 cells |= {f"{key}{end}": float(at) for end, at in zip(RANGE, spread)}
-            versions = engine.versions().items()
-            cells["numbers"] = "float32" if row.rounding == FLOAT32 else "float64"
-            cells["date"] = date.today().isoformat()
-            cells["versions"] = ", ".join(f"{library} {number}" for library, number in versions)
-            rows.append(cells)
+            numbers_of = "float32" if row.rounding == FLOAT32 else "float64"
+            versions = ", ".join(map(" ".join, engine.versions().items()))
+            today = date.today().isoformat()
+            rows.append(cells | {"numbers": numbers_of, "date": today, "versions": versions})
     return rows
 
 
@@ -249,7 +247,7 @@ def read(column: ImpactColumn, engine: Engine, dt: float) -> Array:
     # The readings of a column that are numbers; NaN if the engine refuses the scene.
     try:
         numbers = column.read(engine, dt)
-    except (Unsupported, Frictionless):
+    except Unsupported:
         return np.array([np.nan])
     met = numbers[~np.isnan(numbers)]
     return met if len(met) else np.array([np.nan])

@@ -19,7 +19,9 @@ from crosscheck2d.scenarios.model import Array, Scene, State, frozen
 
 EXERCISE = 0.9  # the restitution that the exercise states
 DT = 1 / 256  # s; a power of two, so that multiples of it are exact
-
+# the most roundings in a collision: a relative velocity, an effective mass, a target, an impulse,
+# two updates; there are fewer between a force and a velocity
+ROUNDINGS = 8
 
 # The laws that an engine breaks, where a probe tells which.
 Departure = StrEnum(

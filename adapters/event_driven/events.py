@@ -72,9 +72,9 @@ class EventEngine:
         refuse_box(scene, box)
         self.scene = scene
         (grid, low), rules = grid_of(scene, box, cell), rules_of(scene, refuse_walls(scene))
-        position = (
-            scene.position if box is None else low + np.mod(scene.position - low, box[1] - low)
-        )
+        position = scene.position
+        if box is not None:
+            position = low + np.mod(position - low, box[1] - low)
         self.arena = Arena(
             disks_of(scene, position, low),
             empty_queue(scene.n),
@@ -115,19 +115,15 @@ class EventEngine:
             int(counters[END_DISK]),
             int(counters[END_PARTNER]),
         )
+        when = f"at {at:.9g} s"
         if status == ACCUMULATION:
-            raise NoTruth(
-                f"the collisions of disk {i} on {self.partners(i, j, at)} accumulate at {at:.9g} s",
-                at,
-            )
+            on = self.partners(i, j, at)
+            raise NoTruth(f"the collisions of disk {i} on {on} accumulate {when}", at)
         if status == REENTRY:
-            raise NoTruth(f"disk {i} re-enters on top of disk {j} at {at:.9g} s", at)
+            raise NoTruth(f"disk {i} re-enters on top of disk {j} {when}", at)
         if status == ROUND_END:
-            raise NoTruth(
-                f"disk {i} slides round the end of wall {-1 - j} at {at:.9g} s: its path there is"
-                " no parabola",
-                at,
-            )
+            where = f"disk {i} slides round the end of wall {-1 - j} {when}"
+            raise NoTruth(f"{where}: its path there is no parabola", at)
 
     def refuse_too_many(self, until: float) -> None:
         """Raise `NoTruth` if the latest events cover less simulated time than is plausible, or if
@@ -141,10 +137,8 @@ class EventEngine:
         now = min(until, float(self.arena.clock[BASE] + self.arena.tree[1].time))
         speed = np.hypot(disks["vx"], disks["vy"]).max()
         acceleration = np.hypot(disks["free_ax"], disks["free_ay"]).max()
-        rate, took = (
-            (IN_ALL + PER_DISK * self.scene.n) * (speed / radius + np.sqrt(acceleration / radius)),
-            now - self.since,
-        )
+        took, events = now - self.since, IN_ALL + PER_DISK * self.scene.n
+        rate = events * (speed / radius + np.sqrt(acceleration / radius))
         # The negation also catches nan.
         if not (self.spent <= rate * took and self.spent * (until - now) <= MOST_AHEAD * took):
             span = f"{self.spent} events from {self.since:.9g} s to {now:.9g} s"
@@ -155,13 +149,10 @@ class EventEngine:
         """The partners of disk `i` in collisions since a time, in words; `last`: the latest one."""
         log = np.concatenate([np.empty((0, 4)), *self.kept[-2:]])
         log = log[log[:, 0] >= since * (1 - 1e-12)]
-        found = {
-            last,
-            *log[log[:, 1] == i, 2].astype(int).tolist(),
-            *log[log[:, 2] == i, 1].astype(int).tolist(),
-        }
-        disks, walls = (sorted(j for j in found if j >= 0), sorted(-1 - j for j in found if j < 0))
-        return " and ".join([*(f"disk {j}" for j in disks), *(f"wall {w}" for w in walls)])
+        partners = {last, *map(int, log[log[:, 1] == i, 2]), *map(int, log[log[:, 2] == i, 1])}
+        disks = [f"disk {j}" for j in sorted(partners) if j >= 0]
+        walls = [f"wall {-1 - j}" for j in sorted(partners, reverse=True) if j < 0]
+        return " and ".join(disks + walls)
 
     def accelerate(self, disk: int, at: float, acceleration: Array, rate: float = 0.0) -> None:
         """Set the acceleration (2,) m/s2 of a disk that is not static, and its angular acceleration
@@ -201,23 +192,18 @@ class EventEngine:
             apart = [Fraction(b.x) - Fraction(a.x), Fraction(b.y) - Fraction(a.y)]
             if grid.torus:
                 apart = [d - Fraction(s) * round(d / Fraction(s)) for d, s in zip(apart, grid.span)]
+            speeds = [Fraction(b.vx) - Fraction(a.vx), Fraction(b.vy) - Fraction(a.vy)]
             reach = Fraction(a.radius) + Fraction(b.radius)
             gap = sum(d * d for d in apart) - reach * reach
-            closing = apart[0] * (Fraction(b.vx) - Fraction(a.vx)) + apart[1] * (
-                Fraction(b.vy) - Fraction(a.vy)
-            )
+            closing = sum(d * v for d, v in zip(apart, speeds))
             if gap < 0:
                 overlap = -float(gap) / (float(reach) + np.hypot(float(apart[0]), float(apart[1])))
-                raise NoTruth(
-                    f"disks {i} and {j} overlap by {overlap:.3g} m at the start: move one"
-                    f" {overlap:.3g} m away"
-                )
+                by = f"{overlap:.3g} m"
+                raise NoTruth(f"disks {i} and {j} overlap by {by} at the start: move one {by} away")
             if gap == 0 and closing < 0:
-                speed = -float(closing) / float(reach)
-                raise NoTruth(
-                    f"disks {i} and {j} touch and approach at {speed:.3g} m/s at the start: leave"
-                    " a gap"
-                )
+                fast = f"{-float(closing) / float(reach):.3g} m/s"
+                both = f"disks {i} and {j} touch and approach at {fast}"
+                raise NoTruth(f"{both} at the start: leave a gap")
 
 
 def refuse_walls(scene: Scene) -> bool:
@@ -233,15 +219,11 @@ def refuse_walls(scene: Scene) -> bool:
             gap = offset - Fraction(scene.radius[i]) ** 2
             if gap < 0:
                 overlap = scene.radius[i] - float(offset) ** 0.5
-                by = max(overlap, -float(gap) / (2 * scene.radius[i]))
-                raise NoTruth(
-                    f"disk {i} overlaps wall {w} by {by:.3g} m at the start: move it {by:.3g} m"
-                    " away"
-                )
+                by = f"{max(overlap, -float(gap) / (2 * scene.radius[i])):.3g} m"
+                raise NoTruth(f"disk {i} overlaps wall {w} by {by} at the start: move it {by} away")
             if gap == 0 and closing < 0:
-                raise NoTruth(
-                    f"disk {i} touches wall {w} and moves into it at the start: leave a gap"
-                )
+                both = f"disk {i} touches wall {w} and moves into it"
+                raise NoTruth(f"{both} at the start: leave a gap")
             leaning |= gap == 0
     return leaning
 
@@ -252,9 +234,8 @@ def exact_offset(
     """Squared distance of a point from a segment, and half its rate of change, in rationals."""
     p, v, a, b = ([Fraction(x) for x in point] for point in (position, velocity, start, end))
     u, d = [b[0] - a[0], b[1] - a[1]], [p[0] - a[0], p[1] - a[1]]
-    share = min(
-        max((d[0] * u[0] + d[1] * u[1]) / (u[0] ** 2 + u[1] ** 2), Fraction(0)), Fraction(1)
-    )
+    share = (d[0] * u[0] + d[1] * u[1]) / (u[0] ** 2 + u[1] ** 2)
+    share = min(max(share, Fraction(0)), Fraction(1))
     away = [d[0] - share * u[0], d[1] - share * u[1]]
     return away[0] ** 2 + away[1] ** 2, away[0] * v[0] + away[1] * v[1]
 
@@ -269,47 +250,38 @@ def refuse_box(scene: Scene, torus: Array | None) -> None:
         if torus.shape != (2, 2) or not (torus[0] < torus[1]).all():
             raise ValueError("torus must be [low, high], low below high")
         if (narrow := float((torus[1] - torus[0]).min())) < 3 * widest * WIDER:
-            raise NoTruth(
-                f"the torus is {narrow:g} m wide: three diameters of its largest disk are"
-                f" {3 * widest:g} m"
-            )
+            three = f"three diameters of its largest disk are {3 * widest:g} m"
+            raise NoTruth(f"the torus is {narrow:g} m wide: {three}")
     if scene.wrap is not None and (narrow := float((scene.wrap[1] - scene.wrap[0]).min())) < widest:
-        raise NoTruth(
-            f"the box is {narrow:g} m wide: its largest disk has a diameter of {widest:g} m"
-        )
+        disk = f"its largest disk has a diameter of {widest:g} m"
+        raise NoTruth(f"the box is {narrow:g} m wide: {disk}")
 
 
 def rules_of(scene: Scene, leaning: bool) -> Rules:
     falling, walled = bool(scene.gravity.any()), len(scene.walls) > 0
     # A disk that rests on a wall does not fall with the others; at e = 1 only a disk that touches a
     # wall at the start can rest.
-    mixed = falling and (
-        (walled and (leaning or scene.restitution < 1)) or bool(scene.static.any())
-    )
+    rests = walled and (leaning or scene.restitution < 1)
     # A bounce shorter than 1 / (1 - e) units in the last place of the time gains as much by
     # rounding as it loses by restitution.
-    accumulation_ulps = (
-        1e3 / (1 - min(scene.restitution, SLOWEST)) if scene.restitution < 1 else 1e3
-    )
+    lost = 1 - min(scene.restitution, SLOWEST) if scene.restitution < 1 else 1
     return Rules(
-        float(scene.restitution),
-        falling,
-        mixed,
-        scene.wrap is not None,
-        scene.restitution > SLOWEST,
-        accumulation_ulps,
-        float(scene.friction),
+        restitution=float(scene.restitution),
+        falling=falling,
+        mixed=falling and (rests or bool(scene.static.any())),
+        wrapped=scene.wrap is not None,
+        lasting=scene.restitution > SLOWEST,
+        accumulation_ulps=1e3 / lost,
+        friction=float(scene.friction),
     )
 
 
 def walls_of(scene: Scene, grid: Grid, low: Array) -> Walls:
     side = np.array(grid.side)
-    centre = low + side * (
-        np.stack(np.meshgrid(*map(np.arange, grid.shape), indexing="ij"), -1).reshape(-1, 2) + 0.5
-    )
-    reach = (
-        np.hypot(*side) / 2 + scene.radius.max()
-    ) * WIDER  # of a disk anywhere in the cell of a centre
+    cells = np.stack(np.meshgrid(*map(np.arange, grid.shape), indexing="ij"), -1).reshape(-1, 2)
+    centre = low + side * (cells + 0.5)
+    # of a disk anywhere in the cell of a centre
+    reach = (np.hypot(*side) / 2 + scene.radius.max()) * WIDER
     near = np.zeros((len(centre), len(scene.walls)), bool)
     for w, (start, end) in enumerate(scene.walls):
         along = end - start
@@ -384,9 +356,8 @@ def grid_of(scene: Scene, torus: Array | None, cell: float) -> tuple[Grid, Array
     low, high = (points.min(axis=0), points.max(axis=0)) if torus is None else torus
     extent = high - low
     # At most about four cells per disk, also in a sparse scene.
-    side = np.full(
-        2, max(least, np.sqrt(extent.prod() / (4 * scene.n)), extent.max() / (4 * scene.n))
-    )
+    most = 4 * scene.n
+    side = np.full(2, max(least, np.sqrt(extent.prod() / most), extent.max() / most))
     if torus is None:
         low, shape = low - side, np.ceil(extent / side).astype(np.int64) + 3
         span, shift = side * shape, np.zeros(2)

@@ -111,11 +111,8 @@ def log_collision(arena: Arena, now: float, i: int, j: int, impulse: float) -> N
 @inlined
 def set_end(arena: Arena, now: float, i: int, j: int) -> None:
     # Set when and for which disks the answer ends, should the status say that it does.
-    arena.clock[STOP], arena.counters[END_DISK], arena.counters[END_PARTNER] = (
-        arena.clock[BASE] + now,
-        i,
-        j,
-    )
+    arena.clock[STOP] = arena.clock[BASE] + now
+    arena.counters[END_DISK], arena.counters[END_PARTNER] = i, j
 
 
 @inlined
@@ -148,12 +145,10 @@ def rattles_on_disk(
     if a.weight == 0.0:
         return False
     run.walls = 0
-    acceleration2 = max(
-        a.free_ax * a.free_ax + a.free_ay * a.free_ay, b.free_ax * b.free_ax + b.free_ay * b.free_ay
-    )
-    return rattles(
-        run, a, impulse * (a.weight + b.weight) / (1.0 + restitution), sqrt(acceleration2), counts
-    )
+    of_a = a.free_ax * a.free_ax + a.free_ay * a.free_ay
+    of_b = b.free_ax * b.free_ax + b.free_ay * b.free_ay
+    closing = impulse * (a.weight + b.weight) / (1.0 + restitution)
+    return rattles(run, a, closing, sqrt(max(of_a, of_b)), counts)
 
 
 @kernel

@@ -189,10 +189,8 @@ def leave(arena: Arena, i: int) -> int:
             update_wall_friction(arena, i)
         a.count += 1
         return GOES_ON
-    speed2, press = (
-        a.vx * a.vx + a.vy * a.vy,
-        -normal_component(arena.walls, a, w, a.free_ax, a.free_ay),
-    )
+    speed2 = a.vx * a.vx + a.vy * a.vy
+    press = -normal_component(arena.walls, a, w, a.free_ax, a.free_ay)
     take_off(a)
     a.wall, a.count = -2 - w, a.count + 1
     if arena.rules.friction > 0.0:

@@ -83,9 +83,8 @@ def check_rest(walls: Walls, a: Any) -> None:
     there."""
     if a.corner >= 0 and abs(a.vx) + abs(a.vy) > a.noise:
         # it is moved out of its corner: it rests on the wall along which it moves, if on any
-        if abs(normal_component(walls, a, a.corner, a.vx, a.vy)) < abs(
-            normal_component(walls, a, a.wall, a.vx, a.vy)
-        ):
+        off_corner = abs(normal_component(walls, a, a.corner, a.vx, a.vy))
+        if off_corner < abs(normal_component(walls, a, a.wall, a.vx, a.vy)):
             a.wall = a.corner
         a.corner = -1
         if normal_component(walls, a, a.wall, a.free_ax, a.free_ay) >= 0.0:
@@ -105,9 +104,8 @@ def check_rest(walls: Walls, a: Any) -> None:
 def acceleration_into(walls: Walls, a: Any, w: int, k: int) -> float:
     """m/s2, the acceleration into wall `k` of a disk that slides along wall `w`."""
     (nx, ny), (mx, my) = outward(walls, a, w), outward(walls, a, k)
-    return (nx * mx + ny * my) * (nx * a.free_ax + ny * a.free_ay) - (
-        mx * a.free_ax + my * a.free_ay
-    )
+    along_n, along_m = nx * a.free_ax + ny * a.free_ay, mx * a.free_ax + my * a.free_ay
+    return (nx * mx + ny * my) * along_n - along_m
 
 
 @kernel
@@ -211,16 +209,11 @@ def rests(walls: Walls, a: Any, w: int, k: int, accumulates: bool, trapped: bool
     """
     if k >= 0 and rest_in_corner(walls, a, w, k, trapped):
         return True
-    over = (
-        a.bounces >= COLLISIONS
-        if accumulates or trapped
-        else abs(normal_component(walls, a, w, a.vx, a.vy)) <= a.noise
-    )
-    if (
-        not over
-        or (a.wall >= 0 and k < 0)
-        or normal_component(walls, a, w, a.free_ax, a.free_ay) >= 0.0
-    ):
+    over = abs(normal_component(walls, a, w, a.vx, a.vy)) <= a.noise
+    if accumulates or trapped:
+        over = a.bounces >= COLLISIONS
+    pressed = normal_component(walls, a, w, a.free_ax, a.free_ay) < 0.0
+    if not over or (a.wall >= 0 and k < 0) or not pressed:
         return False
     rest_on(walls, a, w)
     return True
@@ -235,10 +228,8 @@ def update_support(walls: Walls, a: Any) -> None:
     if k >= 0:
         if rest_in_corner(walls, a, w, k, False):
             return
-        if (
-            normal_component(walls, a, w, a.free_ax, a.free_ay) >= 0.0
-            or acceleration_into(walls, a, w, k) > 0.0
-        ):
+        off = normal_component(walls, a, w, a.free_ax, a.free_ay) >= 0.0
+        if off or acceleration_into(walls, a, w, k) > 0.0:
             w = k
     if w >= 0 and normal_component(walls, a, w, a.free_ax, a.free_ay) < 0.0:
         rest_on(walls, a, w)

@@ -20,14 +20,7 @@ POSITION_FIRST = ("move", "pairs", "walls", "accelerate")
 # Detect at the old positions, set target velocities after gravity, then move (Box2D 2.3,
 # b2Island::Solve).
 BOX2D = (
-    "detect",
-    "by_island",
-    "accelerate",
-    "aim",
-    "warm_start",
-    "bounce",
-    "cap",
-    "move",
+    *("detect", "by_island", "accelerate", "aim", "warm_start", "bounce", "cap", "move"),
     "position_correction",
 )
 # Move, detect there, set target velocities before gravity; position correction moves in the next
@@ -35,13 +28,8 @@ BOX2D = (
 PYMUNK = ("move", "detect", "aim", "accelerate", "warm_start", "bounce", "nudge")
 # Detect and set targets once, then soft substeps, then one sweep for restitution (Box2D 3.1,
 # b2SolverStage).
-BOX2D_V3 = (
-    "detect",
-    "by_colour",
-    "aim",
-    *("accelerate", "warm_start", "soften", "move", "relax") * 4,
-    "restitute",
-)
+SUBSTEP = ("accelerate", "warm_start", "soften", "move", "relax")
+BOX2D_V3 = ("detect", "by_colour", "aim", *SUBSTEP * 4, "restitute")
 
 MIXING: dict[str, Callable[[float, float], float]] = {
     "as stated": lambda a, _: a,

@@ -19,7 +19,6 @@ from crosscheck2d.adapters.mechanisms.contacts import (
     carried_off,
     closing,
     detect,
-    detect_again,
     drive_to_target,
     gap_along,
     gap_of,
@@ -34,21 +33,8 @@ from crosscheck2d.reference_impl.state import Disks, World
 
 Collision = tuple[int, int, int, float]  # step, i, j or -1 - wall, impulse N s
 STAGES = (
-    "accelerate",
-    "move",
-    "pairs",
-    "walls",
-    "detect",
-    "by_island",
-    "by_colour",
-    "aim",
-    "warm_start",
-    "bounce",
-    "cap",
-    "position_correction",
-    "nudge",
-    "soften",
-    "relax",
+    *("accelerate", "move", "pairs", "walls", "detect", "by_island", "by_colour", "aim"),
+    *("warm_start", "bounce", "cap", "position_correction", "nudge", "soften", "relax"),
     "restitute",
 )
 ACCELERATE, MOVE, PAIRS, WALLS, DETECT, BY_ISLAND, BY_COLOUR, AIM = range(8)
@@ -112,10 +98,7 @@ def advance(  # noqa: C901, PLR0912 - a branch for each stage: numba has no tabl
             elif stage == WALLS:
                 walls(disks, world, on, k, collisions)
             elif stage == DETECT:
-                if on.recycled > 0.0:
-                    detect_again(disks, world, on.margin, on.recycled, on.fattened, kept)
-                else:
-                    detect(disks, world, on.margin, on.skin, on.touching, on.memory, kept)
+                detect(disks, world, on, kept)
             elif stage == BY_ISLAND:
                 by_island(disks.mass, kept)
             elif stage == BY_COLOUR:
@@ -228,16 +211,7 @@ def meet(
     _, nx, ny = gap_of(disks, world, i, j)
     law = world
     if on.threshold > 0.0 and closing(disks.velocity, i, j, nx, ny) >= -on.threshold:
-        law = World(
-            0.0,
-            world.gravity,
-            world.walls,
-            world.low,
-            world.high,
-            world.split,
-            world.approaching_only,
-            world.friction,
-        )
+        law = World(0.0, *world[1:])
     impulse = collide(disks, i, j, law) if j >= 0 else collide_wall(disks, i, -1 - j, law)
     if not (on.project if j >= 0 else on.project_walls):
         x[i, 0], x[i, 1] = xi, yi

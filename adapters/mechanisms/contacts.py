@@ -2,7 +2,7 @@
 from step to step.
 
 A contact is of disk i and disk j, or wall w as j = -1 - w. Its normal n points from j to i, as at
-its detection. In Rapier (`detect_again`) a pair is tested when its boxes start to overlap, and
+its detection. In Rapier (`consider`) a pair is tested when its boxes start to overlap, and
 again only after a relative motion above a given length: until then a contact keeps its normal and
 contact points, and a pair without contact stays without. Compiled by numba, as `exercise` is.
 """
@@ -73,7 +73,7 @@ class Contacts(NamedTuple):
     # (n, n + w, 5): impulse, slide, colour, age in steps (0: long ago), and total
     before: np.ndarray
     looks: np.ndarray  # (n, n + w) of `LOOK`
-    boxes: np.ndarray  # (n + w, 4) m: of `detect_again`, left, bottom, right, top
+    boxes: np.ndarray  # (n + w, 4) m: of `enclose`, left, bottom, right, top
     least: np.ndarray  # (4,) m: the smallest box of one body
 
 
@@ -96,40 +96,44 @@ def no_contacts(n: int, walls: int, precision: type) -> Contacts:
 
 
 @internal
-def detect(
-    disks: Disks,
-    world: World,
-    margin: float,
-    skin: float,
-    touching: bool,
-    memory: int,
-    kept: Contacts,
-) -> None:
+def detect(disks: Disks, world: World, on, kept: Contacts) -> None:
     """Find the contacts: pairs i < j with a gap below `margin`, then walls, thicker by `skin`.
 
     If `touching`, a gap of exactly `margin` counts as well. A contact starts with its last
-    impulses, unless these are older than `memory` steps.
+    impulses, unless these are older than `memory` steps. If `recycled`, only those pairs are tested
+    whose boxes overlap and that have moved by more than it; by more than `margin` if they were no
+    contact (Rapier, process_pair).
     """
-    n = len(disks.radius)
-    remember(memory, kept)
+    n, margin = len(disks.radius), on.margin
+    remember(on.memory, kept)
     kept.found[0] = 0
+    if on.recycled > 0.0:
+        enclose(disks, world, margin / 2, on.fattened, kept)
     for i in range(n):
         for j in range(i + 1, n):
+            if disks.mass[i] == inf and disks.mass[j] == inf:
+                continue
+            if on.recycled > 0.0:
+                consider(disks, world, margin, on.recycled, kept, i, j)
+                continue
             dx, dy = (
                 disks.position[i, 0] - disks.position[j, 0],
                 disks.position[i, 1] - disks.position[j, 1],
             )
             reach = disks.radius[i] + disks.radius[j] + margin
             near = dx * dx + dy * dy - reach * reach
-            if (near < 0.0 or (touching and near == 0.0)) and (
-                disks.mass[i] != inf or disks.mass[j] != inf
-            ):
+            if near < 0.0 or (on.touching and near == 0.0):
                 note(disks, world, 0.0, kept, i, j)
     for i in range(n):
         for w in range(len(world.walls)):
-            near = gap_of(disks, world, i, -1 - w)[0] - margin - skin
-            if (near < 0.0 or (touching and near == 0.0)) and disks.mass[i] != inf:
-                note(disks, world, skin, kept, i, -1 - w)
+            if disks.mass[i] == inf:
+                continue
+            if on.recycled > 0.0:
+                consider(disks, world, margin, on.recycled, kept, i, -1 - w)
+                continue
+            near = gap_of(disks, world, i, -1 - w)[0] - margin - on.skin
+            if near < 0.0 or (on.touching and near == 0.0):
+                note(disks, world, on.skin, kept, i, -1 - w)
 
 
 @internal
@@ -334,27 +338,6 @@ def turn(disks: Disks, contact, by: float, lever: float) -> None:
     disks.angular_velocity[i] -= (disks.radius[i] + contact.seen * lever) * by / inertia[i]
     if j >= 0:
         disks.angular_velocity[j] -= (disks.radius[j] + contact.seen * lever) * by / inertia[j]
-
-
-@internal
-def detect_again(
-    disks: Disks, world: World, margin: float, recycled: float, fattened: float, kept: Contacts
-) -> None:
-    """Find the contacts, pairs i < j with a gap below `margin`, then walls, but test only pairs
-    whose boxes overlap and that have moved by more than `recycled`; by more than `margin` if they
-    were no contact (Rapier, process_pair)."""
-    n = len(disks.radius)
-    remember(1, kept)
-    kept.found[0] = 0
-    enclose(disks, world, margin / 2, fattened, kept)
-    for i in range(n):
-        for j in range(i + 1, n):
-            if disks.mass[i] != inf or disks.mass[j] != inf:
-                consider(disks, world, margin, recycled, kept, i, j)
-    for i in range(n):
-        for w in range(len(world.walls)):
-            if disks.mass[i] != inf:
-                consider(disks, world, margin, recycled, kept, i, -1 - w)
 
 
 @internal

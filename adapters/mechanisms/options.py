@@ -4,16 +4,15 @@ option, or a sweep of one parameter."""
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
+from typing import NamedTuple
 
 from crosscheck2d.adapters.engine import Engine
 from crosscheck2d.adapters.engine_row import AccuracyParameter
 from crosscheck2d.adapters.engines import ENGINES, changed
 
 
-@dataclass(frozen=True)
-class Option:
+class Option(NamedTuple):
     """One change to one engine."""
 
     engine: str  # the row of `ENGINES` to compare with, `engine:profile`
@@ -25,18 +24,15 @@ class Option:
         return ENGINES[self.engine].make
 
 
-OPTIONS: tuple[Option, ...] = tuple(
+OPTIONS = tuple(
     option
     for name, row in ENGINES.items()
     for option in (
+        *(Option(name, what, partial(row.make, **it)) for what, it in row.options.items()),
         *(
-            Option(name, change, partial(changed, name, **settings))
-            for change, settings in row.options.items()
-        ),
-        *(
-            Option(name, f"as {other}", same.make)
-            for other, same in ENGINES.items()
-            if same.bits_of == name
+            Option(name, f"as {same}", it.make)
+            for same, it in ENGINES.items()
+            if it.bits_of == name
         ),
     )
 )
@@ -45,8 +41,7 @@ b2World_EnableWarmStarting, which pyb2d3 does not hand on; no library can disabl
 """
 
 
-@dataclass(frozen=True)
-class Sweep:
+class Sweep(NamedTuple):
     """A parameter of an engine over its values: a way to spend time other than smaller steps."""
 
     engine: str  # the row of `ENGINES` whose parameter is swept, `engine:profile`
@@ -60,7 +55,7 @@ class Sweep:
         return partial(changed, self.engine, **{self.parameter.setting: value})
 
 
-SWEEPS: tuple[Sweep, ...] = tuple(
+SWEEPS = tuple(
     Sweep(name, row.work)
     for name, row in ENGINES.items()
     if row.work is not None and name.endswith(":matched")

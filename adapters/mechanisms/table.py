@@ -20,22 +20,14 @@ from crosscheck2d.adapters.engines import row_of
 from crosscheck2d.adapters.mechanisms.ablated import BOX2D, BOX2D_V3, PYMUNK, AblatedReference
 from crosscheck2d.scenarios.model import Scene
 
+FLIGHT, RESTITUTION, IMPULSE, RECYCLING = "flight", "restitution", "impulse", "contact recycling"
+EDGES, FRICTION, SKIN = "edges of the box", "friction", "wall skin"
+POSITION_CORRECTION, DIGITS, SWEPT = "position correction", "float32", "CCD, sleep"
+AIR, SIDES = "friction of the air", "polygons for disks"
 NAMES = (
-    "flight",
-    "restitution",
-    "impulse",
-    "contact recycling",
-    "edges of the box",
-    "friction",
-    "wall skin",
-    "position correction",
-    "float32",
-    "CCD, sleep",
-    "friction of the air",
-    "polygons for disks",
+    *(FLIGHT, RESTITUTION, IMPULSE, RECYCLING, EDGES, FRICTION, SKIN, POSITION_CORRECTION),
+    *(DIGITS, SWEPT, AIR, SIDES),
 )
-FLIGHT, RESTITUTION, IMPULSE, RECYCLING, EDGES, FRICTION = NAMES[:6]
-SKIN, POSITION_CORRECTION, DIGITS, SWEPT, AIR, SIDES = NAMES[6:]
 MANY_SIDES = 800  # of matter's disks, which are polygons: their effect is in the residual
 # Exact flight; bodies that overlap at the end of a step exchange their impulse there; nothing is
 # moved out of overlap.
@@ -114,8 +106,7 @@ def _without(name: str, **changed: Any) -> Callable[[], Engine]:
 
 
 def _pymunk(reported: Mapping[str, Any], scene: Scene, dt: float, name: str) -> list[Mechanism]:
-    # Its bounce reverses any speed of a contact, also a separating one
-    # (cpArbiterPreStep).
+    # Its bounce reverses any speed of a contact, also a separating one (cpArbiterPreStep).
     impulse = {
         "order": PYMUNK,
         "iterations": reported["iterations"],
@@ -127,20 +118,19 @@ def _pymunk(reported: Mapping[str, Any], scene: Scene, dt: float, name: str) -> 
         "slop": reported["collision_slop"],
     }
     uncorrected = _without(name, collision_bias=1.0)
-    found = [
+    mechanisms = [
         Mechanism(IMPULSE, impulse),
         Mechanism(POSITION_CORRECTION, correction, (IMPULSE,), uncorrected),
     ]
     if name.endswith(":matched"):
-        return found
+        return mechanisms
     as_stated = _without(name, elasticity=float(np.sqrt(scene.restitution)))
-    rough = _without(name, friction=float(np.sqrt(scene.friction)))
-    mixed = [Mechanism(FRICTION, {"friction": reported["friction of a pair"]}, without=rough)]
-    return [
-        Mechanism(RESTITUTION, {"mixing": "the product"}, without=as_stated),
-        *found,
-        *(mixed if scene.friction else []),
-    ]
+    mechanisms.insert(0, Mechanism(RESTITUTION, {"mixing": "the product"}, without=as_stated))
+    if scene.friction:
+        rough = _without(name, friction=float(np.sqrt(scene.friction)))
+        mixed = {"friction": reported["friction of a pair"]}
+        mechanisms.append(Mechanism(FRICTION, mixed, without=rough))
+    return mechanisms
 
 
 def _box2d(reported: Mapping[str, Any], scene: Scene, dt: float, name: str) -> list[Mechanism]:
@@ -154,9 +144,7 @@ def _box2d(reported: Mapping[str, Any], scene: Scene, dt: float, name: str) -> l
         cap = reported["speed cap in m/s"] * dt
         most = 0.1 * cap  # b2_maxLinearCorrection 0.2 is a tenth of b2_maxTranslation, the cap
     without, shipped = partial(_without, name), name.endswith(":shipped")
-    velocity, position = (
-        int(count) for count in reported["velocity, position iterations"].split(",")
-    )
+    velocity, position = map(int, reported["velocity, position iterations"].split(","))
     impulse = {"order": BOX2D, "iterations": velocity, "touching": True, "cap": cap}
     correction = {
         "correction_share": 0.2 if position else 0.0,  # b2_baumgarte
@@ -166,21 +154,20 @@ def _box2d(reported: Mapping[str, Any], scene: Scene, dt: float, name: str) -> l
     }
     uncorrected = without(position_iterations=0)
     unswept = {"continuous": False, "bullet": False}
-    found = [
+    mechanisms = [
         Mechanism(RESTITUTION, {"threshold": threshold}),
         Mechanism(IMPULSE, impulse),
         Mechanism(POSITION_CORRECTION, correction, (IMPULSE,), uncorrected),
-        # Friction is solved before the normal impulse
-        # (b2ContactSolver::SolveVelocityConstraints).
+        # before the normal impulse (b2ContactSolver::SolveVelocityConstraints)
         *_friction(name, reported, scene, rub_first=True),
     ]
     if shipped:
         # b2_polygonRadius, which an edge has, too: twice the slop.
-        found.append(Mechanism(SKIN, {"skin": 2 * slop}, (IMPULSE, POSITION_CORRECTION)))
+        mechanisms.append(Mechanism(SKIN, {"skin": 2 * slop}, (IMPULSE, POSITION_CORRECTION)))
         unswept["sleeping"] = False
     if shipped or reported["continuous collision"]:
-        found.append(Mechanism(SWEPT, without=without(**unswept)))
-    return found
+        mechanisms.append(Mechanism(SWEPT, without=without(**unswept)))
+    return mechanisms
 
 
 def _friction(name: str, reported: Mapping[str, Any], scene: Scene, **how: bool) -> list[Mechanism]:
@@ -208,26 +195,22 @@ def _box2d_v3(reported: Mapping[str, Any], scene: Scene, _dt: float, name: str) 
         "damping": chosen["damping_ratio"],
     }
     correction = {"correction_speed": chosen["push_speed"], "share_capped": True}
-    found = [
+    awake = {"sleeping": False} if name.endswith(":shipped") else {}
+    mechanisms = [
         Mechanism(IMPULSE, impulse),
         Mechanism(POSITION_CORRECTION, correction, (IMPULSE,)),
         # What the sweep for restitution adds to the normal impulse allows no more friction
         # (b2ApplyRestitutionTask).
         *_friction(name, reported, scene, rub_restituted=False),
+        Mechanism(SWEPT, without=_without(name, continuous=False, **awake)),
     ]
-    awake = {"sleeping": False} if name.endswith(":shipped") else {}
-    found.append(Mechanism(SWEPT, without=_without(name, continuous=False, **awake)))
-    if name.endswith(":matched"):
-        return found
-    # At the threshold itself it bounces, where Box2D 2.3 does not.
-    threshold = float(
-        np.nextafter(np.float32(reported["restitution threshold in m/s"]), np.float32(0))
-    )
-    bouncing = _without(name, restitution_threshold=0.0)
-    return [
-        Mechanism(RESTITUTION, {"threshold": threshold}, without=bouncing),
-        *found,
-    ]
+    if name.endswith(":shipped"):
+        # At the threshold itself it bounces, where Box2D 2.3 does not.
+        stated = np.float32(reported["restitution threshold in m/s"])
+        threshold = {"threshold": float(np.nextafter(stated, np.float32(0)))}
+        bouncing = _without(name, restitution_threshold=0.0)
+        mechanisms.insert(0, Mechanism(RESTITUTION, threshold, without=bouncing))
+    return mechanisms
 
 
 def _rapier(reported: Mapping[str, Any], scene: Scene, _dt: float, name: str) -> list[Mechanism]:
@@ -282,29 +265,30 @@ def _matter(_reported: Mapping[str, Any], scene: Scene, _dt: float, name: str) -
         (RESTITUTION, {"velocity_iterations": 1}),
         (POSITION_CORRECTION, {"position_iterations": 0}),
     ]
-    found, off = list[Mechanism](), dict[str, Any]()
+    mechanisms, off = list[Mechanism](), dict[str, Any]()
     for mechanism, options in steps:
         if options:
             off |= options
-            found.append(Mechanism(mechanism, without=_without(name, **off)))
-    return found
+            mechanisms.append(Mechanism(mechanism, without=_without(name, **off)))
+    return mechanisms
 
 
+LIBRARIES = {
+    "pymunk": _pymunk,
+    "box2d": _box2d,
+    "box2d_v3": _box2d_v3,
+    "planck": _box2d,
+    "matter": _matter,
+    "rapier2d": _rapier,
+}
 MECHANISMS: dict[str, Callable[[Mapping[str, Any], Scene, float], list[Mechanism]]] = {
     "reference:exercise": _exercise,
     "reference:lesson": _lesson,
-    "pymunk:shipped": partial(_pymunk, name="pymunk:shipped"),
-    "pymunk:matched": partial(_pymunk, name="pymunk:matched"),
-    "box2d:shipped": partial(_box2d, name="box2d:shipped"),
-    "box2d:matched": partial(_box2d, name="box2d:matched"),
-    "box2d_v3:shipped": partial(_box2d_v3, name="box2d_v3:shipped"),
-    "box2d_v3:matched": partial(_box2d_v3, name="box2d_v3:matched"),
-    "planck:shipped": partial(_box2d, name="planck:shipped"),
-    "planck:matched": partial(_box2d, name="planck:matched"),
-    "matter:shipped": partial(_matter, name="matter:shipped"),
-    "matter:matched": partial(_matter, name="matter:matched"),
-    "rapier2d:shipped": partial(_rapier, name="rapier2d:shipped"),
-    "rapier2d:matched": partial(_rapier, name="rapier2d:matched"),
+    **{
+        f"{library}:{profile}": partial(make, name=f"{library}:{profile}")
+        for library, make in LIBRARIES.items()
+        for profile in ("shipped", "matched")
+    },
 }
 """The engines whose mechanisms are known, of `ENGINES` and of `FETCHED`: a function of the settings
 that the engine reports, the scene and dt in s."""

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from crosscheck2d.adapters.conformance.laws import ALLOWED
+from crosscheck2d.adapters.conformance.physics import ALLOWED
 from crosscheck2d.adapters.conformance.probe import Departure
 from crosscheck2d.adapters.engines import ENGINES, OWN
 from crosscheck2d.reports.compare.comparison import Comparison

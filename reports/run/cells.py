@@ -24,8 +24,8 @@ from crosscheck2d.scenarios.model import Scenario
 # The source that decides a trajectory, and the source that decides what is said of it; including
 # subfolders.
 SOURCES = (
-    *("adapters/**/*.py", "adapters/**/*.js*", "reference_impl/**/*.py", "scenarios/model.py"),
-    *("reports/run/playing.py", "reports/run/known_answers.py"),
+    *("adapters/**/*.py", "adapters/**/*.js*", "adapters/*.toml", "reference_impl/**/*.py"),
+    *("scenarios/model.py", "reports/run/playing.py", "reports/run/known_answers.py"),
 )
 JUDGE_SOURCE = ("reports/compare/**/*.py", "reports/run/comparing.py", "scenarios/**/*.py")
 CHECK_SOURCE = ("reports/check/**/*.py", "reports/check/**/*.toml")

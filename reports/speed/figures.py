@@ -69,7 +69,6 @@ def figures(results: Results) -> pd.DataFrame:
         cheaper(AGAINST_BARE, "bare_cheaper").assign(value=np.nan, **unknown),
     ]
     table = pd.concat(parts, ignore_index=True)
-    # what friction costs where there is none has a benchmark of its own: tests/bench/friction.py
     return table[~names_of(table).isin([n for n, row in ENGINES.items() if row.adds_friction])]
 
 

@@ -3,11 +3,7 @@ each does what its formula says."""
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -31,6 +27,7 @@ from crosscheck2d.reference_impl import exercise
 from crosscheck2d.scenarios.catalogue import scenario
 from crosscheck2d.scenarios.families.placing import lay_out
 from crosscheck2d.scenarios.model import Array, Scenario
+from tests.reference_impl.test_compiled import printed
 
 FLOAT32, FLOAT64 = 2.0**-24, 2.0**-53
 ORDERS = {"pymunk": PYMUNK, "box2d": BOX2D, "box2d_v3": BOX2D_V3}
@@ -223,18 +220,9 @@ for order, more in (*((o, {}) for o in (EXERCISE, BOX2D, PYMUNK, BOX2D_V3)), (BO
 
 @pytest.mark.slow
 def test_plain_python_gives_the_same_bits_as_the_compiled_solver():
-    outputs = [
-        subprocess.run(
-            [sys.executable, "-c", PLAIN],
-            capture_output=True,
-            check=True,
-            cwd=Path(__file__).parents[2],
-            env=os.environ | {"NUMBA_DISABLE_JIT": disabled},
-        ).stdout
-        for disabled in ("0", "1")
-    ]
-    assert len(outputs[0]) == 5 * 2 * 9 * 2 * 8
-    assert outputs[0] == outputs[1]
+    compiled = printed(PLAIN, compiled=True)
+    assert len(compiled) == 5 * 2 * 9 * 2 * 8
+    assert compiled == printed(PLAIN, compiled=False)
 
 
 ROW = lay_out(

@@ -177,11 +177,12 @@ def test_exact_readings_are_read_as_exact():
             assert spread == pytest.approx([number] * 3, rel=1e-9, abs=1e-9), key
 
 
-def test_the_threshold_of_box2d_is_found_where_it_is_compiled_in():
+def test_the_threshold_of_both_box2ds_is_found_where_it_is_compiled_in():
     # 1 m/s, to the 1 % to which it is looked for.
-    row = TABLE.loc[("box2d:shipped", FINE)]
-    assert 1.0 <= row.threshold_low <= row.threshold_high <= 1.01
-    assert row.e_small == 0
+    for name in ("box2d:shipped", "box2d_v3:shipped"):
+        row = TABLE.loc[(name, FINE)]
+        assert 1.0 <= row.threshold_low <= row.threshold_high <= 1.01
+        assert row.e_small == 0
 
 
 def test_the_cap_on_spin_is_a_quarter_or_an_eighth_of_a_turn_a_step():

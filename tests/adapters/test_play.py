@@ -61,21 +61,6 @@ def test_an_engine_that_is_played_once_is_closed_once_whatever_it_does():
     assert engine.closed == 0  # negative control: `play` leaves that to who made the engine
 
 
-def test_an_engine_whose_library_is_missing_refuses_by_its_name():
-    def missing() -> Engine:
-        raise ModuleNotFoundError("No module named 'toyland'", name="toyland")
-
-    run = play_once(missing, "toy:plain", SCENE, DT)
-
-    assert (run.engine, run.profile, run.status, run.trajectory) == (
-        "toy",
-        "plain",
-        "unsupported",
-        None,
-    )
-    assert run.reason == "toyland cannot be imported: No module named 'toyland'"
-
-
 def test_no_source_file_closes_an_engine_by_hand():
     # The engines of the game and the gases outlive a function; else it is `play_once` or `closing`.
     root = Path(__file__).parents[2]

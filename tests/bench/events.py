@@ -1,8 +1,5 @@
 """How fast the event engine is: `python -m tests.bench.events` prints its figures and the floors
-they must reach.
-
-`billiards` (PyPI, 0.5.0) is compared with where it is installed; nothing else here needs it.
-"""
+they must reach."""
 
 from __future__ import annotations
 
@@ -12,17 +9,13 @@ import subprocess
 import sys
 import tempfile
 from argparse import ArgumentParser, RawDescriptionHelpFormatter
-from dataclasses import replace
 from time import perf_counter
 
 import numpy as np
 
 from crosscheck2d.adapters.event_driven.events import EventEngine
-from crosscheck2d.scenarios.families.placing import box
-from crosscheck2d.scenarios.model import Scene
 from tests.adapters.event_driven.gases import gas
 
-REPEATS = 5
 SLICES = 50  # short ones, so that on a busy machine some are undisturbed
 ROWS = (
     (1000, 0.3, 1_000_000),
@@ -51,40 +44,6 @@ def rate(n: int, packing: float, collisions: int) -> tuple[float, float]:
         seconds = perf_counter() - started
         rates.append(len(engine.collisions) / seconds)
     return max(rates), float(np.median(rates))
-
-
-def in_a_box(n: int, packing: float) -> Scene:
-    scene, torus = gas(n, packing)
-    return replace(scene, walls=box(torus[0] - 0.5, torus[1] + 0.5))
-
-
-def against_billiards(scene: Scene, until: float) -> tuple[float, float, int, float]:
-    """Seconds of `billiards` and of the engine for the same box, how many collisions, and how long
-    both list the same, s."""
-    import billiards
-
-    (left, bottom), (right, top) = scene.walls.min(axis=(0, 1)), scene.walls.max(axis=(0, 1))
-    corners = [(left, bottom), (right, bottom), (right, top), (left, top)]
-    ends = zip(corners, corners[1:] + corners[:1])
-    other = billiards.Billiard([billiards.InfiniteWall(start, end) for start, end in ends])
-    for ball in zip(scene.position, scene.velocity, scene.radius, scene.mass):
-        other.add_ball(*ball)
-    started = perf_counter()
-    theirs = [(t, i, j) for t, i, j in other.evolve(until) if isinstance(j, int | np.integer)]
-    slow = perf_counter() - started
-    fast = np.inf
-    for _ in range(REPEATS):
-        engine = EventEngine(scene)
-        started = perf_counter()
-        engine.advance(until)
-        fast = min(fast, perf_counter() - started)
-    ours = engine.collisions[engine.collisions[:, 2] >= 0][:, :3].tolist()
-    same = 0.0
-    for (t, *mine), (_, *other_pair) in zip(ours, theirs):
-        if {*mine} != {*map(float, other_pair)}:
-            break
-        same = t
-    return slow, fast, len(engine.collisions), same
 
 
 def alone(code: str, **environment: str) -> float:
@@ -128,16 +87,6 @@ def main() -> None:
         print(f"{'    median of ' + str(SLICES) + ' slices':58}{median / 1e6:14.2f}")
     print(f"{'compile all kernels, empty cache: s':58}{compile_time():14.1f}  10 at most")
     print(f"{'N = 100 000: MB':58}{memory():14.0f}  300 at most")
-    try:
-        slow, fast, collisions, same = against_billiards(in_a_box(100, 0.3), 5.0)
-    except ModuleNotFoundError:
-        print("billiards is not installed: `uv pip install billiards==0.5.0`")
-        return
-    print(
-        f"{f'box, N = 100, {collisions} collisions: billiards over this engine, seconds':58}"
-        f"{slow / fast:14.0f}  100"
-    )
-    print(f"{'    the same collisions in the same order until: s':58}{same:14.2f}")
 
 
 if __name__ == "__main__":

@@ -11,11 +11,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crosscheck2d.adapters.engine import Unsupported
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.adapters.play import play
 from crosscheck2d.adapters.reference import Reference
-from crosscheck2d.reference_impl import coulomb, exercise, lesson, neighbours, ordered
+from crosscheck2d.reference_impl import coulomb, exercise, ordered
 from crosscheck2d.scenarios.catalogue import scenario
 from crosscheck2d.scenarios.model import Scene
 
@@ -40,12 +39,6 @@ def test_with_friction_0_it_is_the_exercise_to_the_bit(name):
     for what in ("position", "velocity", "angle", "angular_velocity"):
         assert getattr(one, what).tobytes() == getattr(other, what).tobytes()
     assert one.collisions.impulse.tobytes() == other.collisions.impulse.tobytes()
-
-
-@pytest.mark.parametrize("variant", [exercise, neighbours, lesson])
-def test_what_the_exercise_and_the_lesson_ask_for_has_no_friction(variant):
-    with pytest.raises(Unsupported, match=r"does not model friction, the scene has 0\.3"):
-        Reference(variant).load(thrown(0.5, 0.3), 0.01)
 
 
 def thrown(e, mu):

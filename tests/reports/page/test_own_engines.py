@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from crosscheck2d.adapters.conformance.conform import ask
-from crosscheck2d.adapters.conformance.laws import LAWS
+from crosscheck2d.adapters.conformance.physics import LAWS
 from crosscheck2d.adapters.conformance.probe import Departure
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.adapters.host.engine import TEMPLATES, row_of_file

@@ -5,12 +5,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
+from crosscheck2d.adapters import matched
 from crosscheck2d.adapters.engines import changed
-from crosscheck2d.adapters.matched import chosen, searched
 from crosscheck2d.adapters.npm_packages import missing
 from crosscheck2d.adapters.pymunk import MATCHED as PYMUNK
 from crosscheck2d.reports.compare.view import cut
@@ -46,6 +48,9 @@ from crosscheck2d.scenarios.families.tuning import (
 )
 from crosscheck2d.scenarios.model import Array, Collisions, Scenario
 
+TABLE = pd.read_csv(
+    Path(matched.__file__).with_suffix(".csv"), dtype=str, keep_default_na=False
+).to_dict("records")
 FRESH, MORE = (4, 5, 6, 7), (8, 9, 10, 11)  # never searched
 LIMITS = {
     ("pymunk", "elastic_bias", 0.0),  # nothing is left of an overlap
@@ -61,7 +66,12 @@ def start(one: Scenario) -> Array:
 
 @pytest.mark.parametrize("engine", TUNED)
 def test_what_an_adapter_matches_is_what_the_table_chose(engine: str):
-    table, adapter = chosen(engine), searched_of(engine).chosen
+    adapter = searched_of(engine).chosen
+    table = {
+        row["setting"]: row["value"]
+        for row in TABLE
+        if (row["engine"], row["verdict"]) == (engine, CHOSEN)
+    }
 
     assert table == {name: format_value(adapter[name]) for name in table}
     assert set(table) == set(searched_of(engine).settings)
@@ -69,18 +79,17 @@ def test_what_an_adapter_matches_is_what_the_table_chose(engine: str):
 
 
 def test_every_value_of_the_grid_is_in_the_table_and_every_reason_is_given():
-    rows = searched()
-    kept = {(row["engine"], row["setting"], row["value"]) for row in rows}
+    kept = {(row["engine"], row["setting"], row["value"]) for row in TABLE}
 
-    assert list(rows[0]) == COLUMNS
+    assert list(TABLE[0]) == COLUMNS
     for engine in TUNED:
         what = searched_of(engine)
         for name, (values, _) in what.settings.items():
             assert {(engine, name, format_value(value)) for value in values} <= kept
         assert {(engine, name, "") for name in what.left_alone} <= kept
         assert all(set(names) <= set(what.settings) for names, *_ in what.pairs)
-    assert all(row["why"] for row in rows if row["verdict"] in (CHOSEN, NO_SEARCH))
-    assert not [row for row in rows if row["verdict"] == BETTER]  # the last sweep took nothing
+    assert all(row["why"] for row in TABLE if row["verdict"] in (CHOSEN, NO_SEARCH))
+    assert not [row for row in TABLE if row["verdict"] == BETTER]  # the last sweep took nothing
 
 
 def test_the_tuning_scenes_are_not_those_of_the_suite():
