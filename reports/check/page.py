@@ -74,7 +74,8 @@ def write_page(path: Path, marked: Marked) -> None:
     if check.faults:
         sources = dict.fromkeys(row.read for row in check.faults)
         sections.append(Section("", f"To read: {'; '.join(sources)}."))
-    layers = {layer for one in marked.scenes for layer in layer_names(name, one)}
+    # in order: a set would have another one in each process
+    layers = dict.fromkeys(layer for one in marked.scenes for layer in layer_names(name, one))
     digest = "" if check.solver is None else f"; sha256 of the file {check.solver.digest}"
     page = Page(
         f"{name}: {'no fault found' if check.passed else 'what is wrong, and where'}",

@@ -67,7 +67,9 @@ FORBIDDEN: dict[str, str] = {
     ),
     "file by its handle": (
         "h = ctypes.create_string_buffer(b'\\x08\\0\\0\\0\\x01\\0\\0\\0\\x02' + bytes(19), 32)\n"
-        "return LIBC.syscall(304, os.open('/', 0), h, 0) >= 0"
+        "root = os.open('/', 0)\n"
+        "try: return LIBC.syscall(304, root, h, 0) >= 0\n"
+        "finally: os.close(root)"
     ),
     "handles of the parent": "return os.listdir(f'/proc/{PARENT}/fd')",
     "inherited handles": (

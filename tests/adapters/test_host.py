@@ -140,9 +140,10 @@ def running() -> set[int]:
     found = set()
     for process in psutil.process_iter(["cmdline", "ppid"]):
         if "/host/driver.py" in (process.info["cmdline"] or ()):
-            above = {parent.pid for parent in process.parents()}
-            if os.getpid() in above or process.info["ppid"] == 1:
-                found.add(process.pid)
+            with suppress(psutil.NoSuchProcess):  # it ends meanwhile
+                above = {parent.pid for parent in process.parents()}
+                if os.getpid() in above or process.info["ppid"] == 1:
+                    found.add(process.pid)
     return found
 
 
