@@ -293,11 +293,9 @@ def read_case(name: str, row: dict[str, Any]) -> Case:
     also = WITH_FRICTION_ONLY if name in cases_few.SCENES_WITH_FRICTION else ()
     for variant in row.pop("variants", ()):
         also += with_variant(variant)
-    values = {key: tuple(row.pop(key)) for key in ("values", "quick_values") if key in row}
+    row |= {key: tuple(row[key]) for key in ("values", "quick_values") if key in row}
     play, predicate = PLAYS.get(row.pop("play", ""), once), PREDICATES[row.pop("fails")]
-    return Case(
-        name=name, scene=SCENES[name], predicate=predicate, play=play, also=also, **values, **row
-    )
+    return Case(name=name, scene=SCENES[name], predicate=predicate, play=play, also=also, **row)
 
 
 TEXT = tomllib.loads(Path(__file__).with_name("cases.toml").read_text(encoding="utf-8"))

@@ -216,7 +216,8 @@ def readings(case: Case, limits: Sequence[Limit]) -> Chart | Text:
             and (isfinite(trial.worst) if predicate.bound else not trial.left)
         ]
         if len(points) > 1:
-            lines.append(Line(limit.engine, *zip(*points), limit.engine))
+            x, y = zip(*points)
+            lines.append(Line(limit.engine, x, y, limit.engine))
     if not any(y > 0 for line in lines for y in np.asarray(line.y)):
         return Text(["No engine reads more than 0 anywhere."])
     figure, axes = new_figure(9.5, 3.6)
