@@ -153,7 +153,7 @@ ENGINES: dict[str, EngineRow] = {
     ),
     "reference:ordered": _Reference(
         partial(_reference, "ordered"),
-        "hand-written: exact flight, time-of-impact ordering, friction; 911 lines, no projection",
+        "hand-written: exact flight, time-of-impact ordering, friction; 925 lines, no projection",
         0.5,
         FLOAT64,
         dash=(9, 3, 2, 3),

@@ -447,6 +447,7 @@ def solve_pushes(
     along, effect, way = np.zeros(m), np.zeros(m), np.zeros((bodies, 2))
     for c in range(m):
         scale = max(scale, -open[c])
+    most = scale * mass_of(weight)
     for _ in range(TURNS * (m + TURNS)):
         square, closing = 0.0, 0.0
         for c in range(m):
@@ -466,6 +467,8 @@ def solve_pushes(
             curvature += along[c] * effect[c]
         length, last, stops = square / curvature, square, -1
         for c in range(m):
+            if push[c] + length * along[c] > most:
+                return
             if push[c] + length * along[c] < 0.0:
                 length, stops = -push[c] / along[c], c
         for c in range(m):
@@ -473,6 +476,17 @@ def solve_pushes(
             open[c] += length * effect[c]
         if stops >= 0:
             push[stops], pushes[stops], last = 0.0, False, 0.0
+
+
+@compiled
+def mass_of(weight) -> float:
+    """kg: of the disks of all contacts, each as often as it touches. No contact pushes more than
+    stops them all: a row of disks that fills a box from wall to wall could push itself as hard as
+    rounding says."""
+    mass = 0.0
+    for w in weight.reshape(-1):
+        mass += 1.0 / w if w > 0.0 else 0.0
+    return mass
 
 
 @compiled
