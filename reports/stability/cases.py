@@ -82,8 +82,8 @@ def unusable(scenario: Scenario, played: Trajectory) -> Verdict:
     for verdict in verdicts(scenario, played, dt):
         if verdict.id in ("tunnelled", "energy_gained"):
             value = verdict.value / verdict.bound if verdict.bound else 2 * verdict.value
-            disk = verdict.disks[0] if verdict.disks else None
-            parts.append(read(value, verdict.at, verdict.text, disk, verdict.id))
+            first = verdict.disks[0] if verdict.disks else None
+            parts.append(read(value, verdict.at, verdict.text, first, verdict.id))
     return worst_of(parts[1:] or parts)
 
 

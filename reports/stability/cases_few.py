@@ -62,7 +62,7 @@ def flyby(
     start = touch - speed * dt * (LEAD + phase(run))
     scene = lay_out(
         [[start, offset * reach], [0, 0]],
-        [[speed, 0], [0, 0]],
+        [[speed, 0.0], [0.0, 0.0]],
         radius=[RADIUS, radius],
         mass=[1.0, mass],
         restitution=e,
@@ -154,7 +154,7 @@ def ball(x: float, run: int) -> Scenario:
 
 def scaled(x: float, _run: int) -> Scenario:
     # at x = 1 they approach by 0.13 radii in 1/60 s
-    scene = lay_out([[-2.2 * x, 0], [0, 0]], [[4.0 * x, 0], [0, 0]], radius=0.5 * x)
+    scene = lay_out([[-2.2 * x, 0.0], [0.0, 0.0]], [[4.0 * x, 0.0], [0.0, 0.0]], radius=0.5 * x)
     return scenario_of(scene, 1.0, 1 / 60, truth=partial(pair_answer, scene))
 
 

@@ -34,14 +34,15 @@ def make_variant(name: str, variant: str) -> Any:
     # changed at once, and right after `load`
     settings, _, change = ENGINES[name].variants[variant]
     engine: Any = changed(name, **settings)
-    load = engine.load
+    if change is None:
+        return engine
+    load, after = engine.load, change
 
     def load_and_change(scene: Scene, dt: float) -> None:
         load(scene, dt)
-        change(engine)
+        after(engine)
 
-    if change is not None:
-        engine.load = load_and_change
+    engine.load = load_and_change
     return engine
 
 

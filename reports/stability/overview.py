@@ -129,7 +129,7 @@ def findings(limits: Sequence[Limit]) -> list[str]:
         ],
         columns=columns.split(),
     )
-    failed, limited = table.failed.sum(), table.failed & ~table.refused
+    failed, limited = int(table.failed.sum()), table.failed & ~table.refused
     sentences = [
         WORDS["found"].format(
             counted(len(table), "search", "searches"),
