@@ -46,13 +46,13 @@ def _searched(module: str) -> Searched:
 
 
 def _javascript_searched(name: str) -> Searched:
-    from crosscheck2d.adapters.host.searched import SEARCHED
+    from crosscheck2d.adapters.host.searched import searched_of
 
-    return SEARCHED[name]
+    return searched_of(name)
 
 
 def _javascript(name: str, profile: str, **settings: Any) -> Engine:
-    package = FETCHED[f"{name}:{profile}"].package
+    package = (FETCHED | NAMED)[f"{name}:{profile}"].package
     return _made(
         "crosscheck2d.adapters.host.engine.PackageEngine", name, package, profile, **settings
     )
@@ -114,6 +114,7 @@ _Rapier = partial(
     mark=Mark("#6d9154", "#8cf078", "diamond-wide"),
     searched=partial(_javascript_searched, "rapier2d"),
 )
+_Box2DWasm = partial(EngineRow, outside=True, package="box2d3-wasm")
 SHIPPED = (6, 3)  # the dash of every profile of this name
 
 ENGINES: dict[str, EngineRow] = {
@@ -296,6 +297,23 @@ FETCHED: dict[str, EngineRow] = {
     ),
 }
 
+# An engine that plays only where it is named: no table or page has its results.
+NAMED: dict[str, EngineRow] = {
+    "box2d_wasm:shipped": _Box2DWasm(
+        partial(_javascript, "box2d_wasm", "shipped", float32=True),
+        "Box2D after 3.1 (box2d3-wasm 5.2, float32), own defaults, as box2d_v3:shipped",
+        0.625,
+        FLOAT32,
+        dash=SHIPPED,
+    ),
+    "box2d_wasm:matched": _Box2DWasm(
+        partial(_javascript, "box2d_wasm", "matched", float32=True),
+        "Box2D after 3.1, matched as box2d_v3 is; allowFastRotation: no cap on spins",
+        0.625,
+        FLOAT32,
+    ),
+}
+
 OWN = ":own"  # the profile of a solver's file; its engine is the path
 
 
@@ -303,8 +321,8 @@ _read: dict[str, EngineRow] = {}  # the rows of solvers' files, as they were whe
 
 
 def row_of(name: str) -> EngineRow:
-    """The row of an engine: from `ENGINES`, from `FETCHED`, of one of them at another version, or
-    for a solver's file `PATH:own`, which is read once.
+    """The row of an engine: from `ENGINES`, `FETCHED` or `NAMED`, of one at another version, or for
+    a solver's file `PATH:own`, which is read once.
 
     Raises:
         KeyError: it is none of them.
@@ -318,7 +336,7 @@ def row_of(name: str) -> EngineRow:
 
 def packages() -> dict[str, tuple[str, bool]]:
     # Engine -> the package that other versions of it come in, and whether it is npm's.
-    rows = ((name.partition(":")[0], row) for name, row in (ENGINES | FETCHED).items())
+    rows = ((name.partition(":")[0], row) for name, row in (ENGINES | FETCHED | NAMED).items())
     return {
         name: (row.package or row.wheel, bool(row.package))
         for name, row in rows
@@ -339,7 +357,7 @@ def parsed(name: str) -> tuple[str, LibraryAtVersion | None]:
 
 def known_row(name: str) -> EngineRow | None:
     usual, library = parsed(name)
-    row = ENGINES.get(usual) or FETCHED.get(usual)
+    row = (ENGINES | FETCHED | NAMED).get(usual)
     if row is None or library is None:
         return row
     assert isinstance(row.make, partial)

@@ -14,6 +14,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from base64 import b64encode
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
@@ -98,7 +99,7 @@ class LibraryAtVersion(NamedTuple):
         if not file.is_file():
             about = json.loads((folder / "package.json").read_text(encoding="utf-8"))
             file = folder / str(about["main"])
-        return file.read_text(encoding="utf-8")
+        return script_of(file)
 
     def fetch(self) -> None:
         """Fetch it, whole or not at all, in place of an old one; raises `NotInstalled` with a
@@ -165,6 +166,18 @@ class LibraryAtVersion(NamedTuple):
         place = "npm registry" if self.npm else "package index"
         what = f"{self.package} {self.version} could not be fetched from the {place} ({reason})"
         return NotInstalled(what, reason)
+
+
+def script_of(file: Path) -> str:
+    """What V8 plays of a package: an ES module becomes a script that sets `module.exports`; the
+    WebAssembly beside it is a field `wasm` of that, in base64."""
+    text = file.read_bytes().decode()
+    if file.suffix == ".mjs":
+        text = text.replace("import.meta.url", '""').replace("export default", "module.exports =")
+    wasm = file.with_suffix(".wasm")
+    if wasm.is_file():
+        text += f'\nmodule.exports.wasm = "{b64encode(wasm.read_bytes()).decode()}";'
+    return text
 
 
 @cache

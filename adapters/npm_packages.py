@@ -12,7 +12,13 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from crosscheck2d.adapters.library_at_version import ABSENT, HOW, LibraryAtVersion, NotInstalled
+from crosscheck2d.adapters.library_at_version import (
+    ABSENT,
+    HOW,
+    LibraryAtVersion,
+    NotInstalled,
+    script_of,
+)
 
 PINNED = Path(__file__).parent / "host" / "package.json"
 
@@ -40,17 +46,17 @@ def text_of(package: str) -> str:
     """The text of that file; raises `NotInstalled` if it is not there, or its hash differs."""
     file = pinned_library(package).folder / pinned_file(package)
     try:
-        data = file.read_bytes()
+        text = script_of(file)
     except OSError:
         raise NotInstalled(ABSENT) from None
-    if integrity(data) != pinned()["played"][package]["integrity"]:
+    if integrity(text) != pinned()["played"][package]["integrity"]:
         raise NotInstalled(f"{file} differs from what is pinned (SHA-512); fetch it again: {HOW}")
-    return str(data, "utf-8")
+    return text
 
 
-def integrity(data: bytes) -> str:
+def integrity(text: str) -> str:
     """A hash in the format of npm."""
-    return "sha512-" + b64encode(hashlib.sha512(data).digest()).decode()
+    return "sha512-" + b64encode(hashlib.sha512(text.encode()).digest()).decode()
 
 
 def missing(package: str) -> str:
@@ -88,7 +94,7 @@ def fetch() -> None:
         if missing(package):
             name = pinned_file(package)
             file = library.folder / name
-            actual = f"has {integrity(file.read_bytes())}" if file.is_file() else "is not there"
+            actual = f"has {integrity(script_of(file))}" if file.is_file() else "is not there"
             shutil.rmtree(library.folder)
             wrong = f"what npm fetched of {package} is not what is pinned: {name} {actual}"
             raise NotInstalled(f"not installed: {wrong}")

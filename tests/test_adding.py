@@ -104,11 +104,10 @@ ADDED: dict[str, list[Added]] = {
     "a scenario": [
         Added(
             "scenarios/families/pairs.py",
-            "def toy_scene() -> Scenario:\n    from dataclasses import replace\n\n"
-            '    return replace(near_miss(), name="toy_scene", asks="Is a toy scene here?")\n\n\n',
-            "PAIRS",
+            '    meet("toy_scene", "Is a toy scene here?", position=[[-6, 0.6], [0, 0]],'
+            " velocity=[[12, 0], [0, 0]]),\n",
+            '    meet(\n        "near_miss"',
         ),
-        Added("scenarios/families/pairs.py", "    toy_scene,\n", "    near_miss,\n)"),
     ],
     "a metric": [
         Added(

@@ -7,18 +7,19 @@ import os
 import pickle
 import subprocess
 import sys
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from crosscheck2d.adapters import system
-from crosscheck2d.adapters.engine import ContactImpulse, NotLoaded
+from crosscheck2d.adapters.engine import NotLoaded
 from crosscheck2d.adapters.host.file import SolverFailed
 from crosscheck2d.adapters.host.process import end
 from crosscheck2d.adapters.library_at_version import LibraryAtVersion, NotInstalled
 from crosscheck2d.adapters.library_versions import BOX2D
 from crosscheck2d.adapters.safe_path import python
-from crosscheck2d.scenarios.model import Array, Scene, State
+from crosscheck2d.scenarios.model import Array, Scene
 
 # (this process, folder) -> a process that waits for the next engine; it ends with this one
 waiting: dict[tuple[int, Path], subprocess.Popen[bytes]] = {}
@@ -93,15 +94,10 @@ class EngineApart:
     def step(self, count: int = 1) -> None:
         self.wrapping += self.ask("step", count)
 
-    def read(self) -> State:
-        state: State = self.ask("read")
-        return state
-
-    def collisions(self) -> list[ContactImpulse]:
-        return list(self.ask("collisions"))
-
-    def settings(self) -> dict[str, tuple[Any, Any]]:
-        return dict(self.ask("settings"))
+    def __getattr__(self, verb: str) -> Any:
+        if verb not in ("read", "collisions", "settings"):
+            raise AttributeError(verb)
+        return partial(self.ask, verb)
 
     def versions(self) -> dict[str, str]:
         versions: dict[str, str] = self.ask("versions")
@@ -135,15 +131,12 @@ def serve(folder: str) -> None:
                     place, given, settings = arguments
                     module, _, name = place.rpartition(".")
                     engine = getattr(import_module(module), name)(*given, **settings)
-                elif verb == "load":
-                    *given, engine.listening = arguments
-                    engine.load(*given)
-                elif verb == "step":
-                    engine.wrapping = 0.0
-                    engine.step(*arguments)
-                    result = engine.wrapping
-                else:
-                    result = getattr(engine, verb)(*arguments)
+                    continue
+                if verb == "load":
+                    engine.listening = arguments.pop()
+                engine.wrapping = 0.0
+                result = getattr(engine, verb)(*arguments)
+                result = engine.wrapping if verb == "step" else result
         except Exception as error:
             raised = error
         pickle.dump((result, raised), answers)

@@ -18,7 +18,7 @@ from crosscheck2d.adapters.advance import Foreseen
 from crosscheck2d.adapters.engine import SILENT, ContactImpulse, NotLoaded, Unsupported
 from crosscheck2d.adapters.engine_row import FLOAT64, EngineRow
 from crosscheck2d.adapters.float32 import must_fit, rounding
-from crosscheck2d.adapters.friction import must_be_frictionless
+from crosscheck2d.adapters.friction import must_be_frictionless, of_shapes
 from crosscheck2d.adapters.host.file import (
     LONGEST,
     SolverFailed,
@@ -86,9 +86,8 @@ def box_of(walls: Array) -> list[list[float]] | None:
     low, high = walls.min(axis=(0, 1)).tolist(), walls.max(axis=(0, 1)).tolist()
     corners = [low, [high[0], low[1]], high, [low[0], high[1]]]
     sides = {frozenset(map(tuple, side)) for side in zip(corners, corners[1:] + corners[:1])}
-    return (
-        [low, high] if {frozenset(map(tuple, wall)) for wall in walls.tolist()} == sides else None
-    )
+    made = {frozenset(map(tuple, wall)) for wall in walls.tolist()}
+    return [low, high] if made == sides else None
 
 
 class GuestEngine:
@@ -127,7 +126,7 @@ class GuestEngine:
         return self.started
 
     def learn(self, process: SolverProcess) -> None:
-        """What has to be known of the file before a scene."""
+        pass
 
     def load(self, scene: Scene, dt: float) -> None:
         assert self.process  # it is started, and known
@@ -161,7 +160,7 @@ class GuestEngine:
         self.steps += count
         self.rows = None
         if not self.collected:
-            self.inside += self.do("step", request, self.limit)
+            self.inside += self.do("step", request, self.limit) or 0.0
             self.limit = self.patience
         elif single and last.get("held") and last["forces"] == forces:
             last["count"] += 1  # a frame under thrust: one list of forces, not one for each step
@@ -217,9 +216,9 @@ class GuestEngine:
 class PackageEngine(GuestEngine):
     """planck, matter or Rapier: `NAME.js` of this folder, which drives an npm package.
 
-    Its file says what the profiles choose; `changed` are keys of that choice; `library` is another
-    version than the pinned one. The driver does the wrap, and its time is in that of `step`.
-
+    Its file says what the profiles choose; `changed` are keys of that choice, or friction;
+    `library` is another version than the pinned one. The driver does the wrap, and its time is in
+    that of `step`.
     """
 
     load_limit = 2 * STEP_LIMIT
@@ -260,7 +259,9 @@ class PackageEngine(GuestEngine):
         self.ahead = deque[Array]()
 
     def message(self, scene: Scene, dt: float) -> dict[str, Any]:
-        return super().message(scene, dt) | {"profile": self.profile, "changed": self.changed}
+        friction = of_shapes(scene, self.profile == "matched", self.changed.get("friction"))
+        chosen = {"profile": self.profile, "changed": self.changed, "own_friction": friction}
+        return super().message(scene, dt) | chosen
 
     def do(self, command: str, argument: Any, limit: float) -> Any:
         try:
@@ -296,15 +297,12 @@ class PackageEngine(GuestEngine):
         self.expected = (count, times - 1)
         self.rows = self.ahead.popleft()
 
-    def read(self) -> State:
-        state, scene = super().read(), self.scene
-        still = scene.static
-        return State(
-            np.where(still[:, None], scene.position, state.position),
-            np.where(still[:, None], 0.0, state.velocity),
-            np.where(still, scene.angle, state.angle),
-            np.where(still, scene.angular_velocity, state.angular_velocity),
-        )
+    def readings(self, answer: dict[str, Any]) -> Array:
+        rows, scene = super().readings(answer).copy(), self.scene
+        turning = (scene.angle, scene.angular_velocity)
+        start = np.column_stack([scene.position, np.zeros((scene.n, 2)), *turning])
+        rows[:, scene.static] = start[scene.static]
+        return rows
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
         rows = super().settings()

@@ -29,6 +29,10 @@ PATIENCE = 3
 LONGEST = 300  # characters of a message
 # the first bytes of what is handed in under the name of a solver
 DOCUMENTS = {b"%PDF-": "a PDF", b"PK\x03\x04": "a zip, or a document of Office", rb"{\rtf": "RTF"}
+MARKS = {  # utf-32 first: its mark begins with that of utf-16
+    **dict.fromkeys((codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE), "utf-32"),
+    **dict.fromkeys((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE), "utf-16"),
+}
 KINDS = {".js": "javascript", ".py": "python"}
 DEF = re.compile(r"^[ \t]*def \w+\(.*:", re.MULTILINE)
 OURS = (PACKAGE, "reference_impl")
@@ -88,8 +92,6 @@ class SolverText:
     """A guest's file as read, with all that is needed to play it on any machine.
 
     Attributes:
-        path: where it was.
-        kind: "javascript" or "python".
         text: with \\n at the end of lines.
         digest: 16 hex digits of SHA-256 over the file's bytes, as sha256sum gives them.
         imported: the modules that it imports from its own folder, or the gl-matrix that it calls:
@@ -146,8 +148,8 @@ HINTS = {
     **dict.fromkeys((".html", ".htm"), "; save the text of its script as a .js file"),
     **dict.fromkeys((".mjs", ".cjs"), "; leave out import and export, and name it .js"),
     ".ipynb": "; save its cells as a .py file",
+    **dict.fromkeys((".zip", ".gz", ".tgz", ".tar", ".7z", ".rar", ".xz", ".bz2"), "; unpack it"),
 }
-PACKED = (".zip", ".gz", ".tgz", ".tar", ".7z", ".rar", ".xz", ".bz2")
 
 
 def read_solver(path: Path, within: Path | None = None) -> SolverText:
@@ -160,10 +162,8 @@ def read_solver(path: Path, within: Path | None = None) -> SolverText:
     ending = path.suffix.lower()
     kind = KINDS.get(ending)
     if kind is None:
-        hint = HINTS.get(ending, "; unpack it" if ending in PACKED else "")
-        raise NotASolver(
-            f"{path}: ends in {path.suffix or 'nothing'}; a solver is a .js or a .py file{hint}"
-        )
+        ends = f"ends in {path.suffix or 'nothing'}; a solver is a .js or a .py file"
+        raise NotASolver(f"{path}: {ends}{HINTS.get(ending, '')}")
     data = read_bytes(path, "name an Exercise.js or a solver.py")
     must_be_own(path, within)
     text = decoded(path, data)
@@ -285,23 +285,17 @@ def dangling(path: Path) -> bool:
 def decoded(path: Path, data: bytes) -> str:
     """Text from UTF-8, from UTF-16 or UTF-32 with its mark, or from Windows' Latin letters; \\n
     ends its lines."""
-    return letters(path, data).replace("\r\n", "\n").replace("\r", "\n")
-
-
-def letters(path: Path, data: bytes) -> str:
-    if data.startswith((codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE)):
-        return data.decode("utf-32", errors="replace")
-    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        return data.decode("utf-16", errors="replace")
+    encoding = next((name for mark, name in MARKS.items() if data.startswith(mark)), None)
     for begins, what in DOCUMENTS.items():
         if data.startswith(begins):
             raise NotASolver(f"{path}: is {what}; save the text of your solver alone, as UTF-8")
-    odd = next((k for k, byte in enumerate(data) if byte < 32 and byte not in b"\t\n\r\f\v"), None)
+    odd = re.search(rb"[\0-\x08\x0e-\x1f]", data) if encoding is None else None
     if odd is not None:
         raise NotASolver(
-            f"{path}: is not text (byte {data[odd]} at offset {odd}); save it as UTF-8 text"
+            f"{path}: is not text (byte {odd[0][0]} at offset {odd.start()}); save it as UTF-8 text"
         )
     try:
-        return data.decode("utf-8-sig")
+        text = data.decode(encoding or "utf-8-sig")
     except UnicodeDecodeError:
-        return data.decode("cp1252", errors="replace")
+        text = data.decode(encoding or "cp1252", errors="replace")
+    return text.replace("\r\n", "\n").replace("\r", "\n")

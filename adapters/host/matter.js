@@ -8,7 +8,7 @@
   const RESTING = Matter.Resolver._restingThresh;  // of the library, not of a world: every world sets it
   const THIN = 1e-3;  // pixels, of a wall: it has no segments
   const common = {
-    friction: null, turning: true, position_iterations: 6, velocity_iterations: 4, sleeping: false,
+    turning: true, position_iterations: 6, velocity_iterations: 4, sleeping: false,
     slop: null, resting: RESTING,
   };
   // A hundred pixels in a metre, as in a page; its own friction of the air, static friction and number of sides.
@@ -21,7 +21,8 @@
 
   globalThis.models = "disks walls gravity static forces rotation friction wrap";
   globalThis.create = (scene, dt) => {
-    const chosen = { ...profiles[scene.profile], ...scene.changed }, { restitution } = scene, heard = [];
+    const chosen = { ...profiles[scene.profile], ...scene.changed }, heard = [];
+    const { restitution, own_friction: friction } = scene;  // null: the engine's own default
     const fixed = (i) => scene.mass[i] === Infinity;
     const scale = chosen.matched ? chosen.pixels_in_radius / Math.min(...scene.radius) : chosen.pixels;
     const speed = scale * BASE / 1000, spin = BASE / 1000, force = scale * 1e-6;
@@ -31,8 +32,6 @@
       enableSleeping: chosen.sleeping,
       gravity: { x: scene.gravity[0], y: scene.gravity[1], scale: force },
     });
-    const stated = chosen.matched || scene.friction > 0 ? scene.friction : null;
-    const friction = chosen.friction === null ? stated : chosen.friction;
     const set = {
       friction, frictionAir: chosen.friction_air, frictionStatic: chosen.friction_static, slop: chosen.slop,
     };

@@ -6,10 +6,10 @@
   const planck = module.exports;
   const common = { velocity_iterations: 8, position_iterations: 3, warm_starting: true, turning: true, baumgarte: 0.2 };
   const shipped = {
-    ...common, continuous: true, bullet: false, sleeping: true, friction: null, skin: true, matched: false,
+    ...common, continuous: true, bullet: false, sleeping: true, skin: true, matched: false,
   };
   const matched = {
-    ...common, continuous: true, bullet: true, sleeping: false, friction: null, skin: false, matched: true,
+    ...common, continuous: true, bullet: true, sleeping: false, skin: false, matched: true,
     length_unit: 1e-5, step_unit: 0, time_unit: 1000,
   };
   const DEFAULTS = {
@@ -40,7 +40,8 @@
 
   globalThis.models = "disks walls gravity static forces rotation friction wrap";
   globalThis.create = (scene, dt) => {
-    const chosen = { ...profiles[scene.profile], ...scene.changed }, { restitution } = scene, heard = [];
+    const chosen = { ...profiles[scene.profile], ...scene.changed }, heard = [];
+    const { restitution, own_friction: friction } = scene;  // null: the engine's own default
     const { continuous, bullet, position_iterations: iterations } = chosen;
     const fixed = (i) => scene.mass[i] === Infinity;
     set(scene, dt, chosen);
@@ -48,9 +49,6 @@
       gravity: vector(scene.gravity), allowSleep: chosen.sleeping, continuousPhysics: continuous,
       warmStarting: chosen.warm_starting,
     });
-    // Who wants no friction and does not think of it leaves the engine's own default; matched sets what is stated.
-    const stated = chosen.matched || scene.friction > 0 ? scene.friction : null;
-    const friction = chosen.friction === null ? stated : chosen.friction;
     const surface = { restitution, density: 1, ...(friction === null ? {} : { friction }) };
     const bodies = scene.position.map((position, i) => {
       const body = space.createBody({

@@ -11,13 +11,24 @@ import signal
 import subprocess
 import tempfile
 from base64 import b64decode
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from time import monotonic
-from typing import Any, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
+from pydantic import (
+    AfterValidator,
+    Field,
+    StrictBool,
+    StrictFloat,
+    StrictInt,
+    StrictStr,
+    TypeAdapter,
+    ValidationError,
+)
+from typing_extensions import TypedDict
 
 from crosscheck2d.adapters import system
 from crosscheck2d.adapters.engine import NotStarted
@@ -32,13 +43,6 @@ INTRUDED = "wrote into the channel that its answers come by"
 TOO_LARGE = "needs more memory than it may use, and its process was ended"
 LONGEST_ANSWER = 2**28  # bytes of a line: the states of a million disks take less than 2**27
 GRACE = 4.0  # s beyond what the calls of a request may take
-KINDS_OF_FAILURE = frozenset(
-    {
-        *("error", "timeout", "memory", "crashed", "refused", "diverged"),
-        "unavailable",  # it imports what is not there, or what a guest may not
-        "waited",  # ended by the clock, before it had its processor time
-    }
-)
 Request = tuple[str, Any, float]
 """A command of the driver, its argument, and how long it may take, s."""
 
@@ -87,22 +91,16 @@ def end(process: subprocess.Popen[bytes]) -> None:
 
 
 class SolverProcess:
-    """A guest in a separate process; use it in a `with`, or close it.
+    """A guest in a separate process; use it in a `with`, or close it. Raises `SolverFailed` if the
+    file cannot be loaded, `NotStarted` if the process cannot be started.
 
     compiled: numba compiles, and keeps what it has compiled.
 
     Attributes:
         functions: name of a verb of the driver -> whether the file has it; models; the built-ins
             that it replaced.
-        kind: "javascript" or "python".
         surface: "exercise" (functions on spheres), "advance" (arrays, as in reference_impl) or
             "engine" (create, step, read).
-        versions: library -> version.
-        level: what protects the machine from it.
-
-    Raises:
-        SolverFailed: the file cannot be loaded.
-        NotStarted: the process cannot be started.
     """
 
     process: subprocess.Popen[bytes] | None
@@ -117,35 +115,34 @@ class SolverProcess:
         self.order = solver.order | {"folder": str(self.copies) if self.copies else None}
         digest = hashlib.sha256(json.dumps([levels(), self.order]).encode()).hexdigest()
         self.key = os.getpid(), digest
-        hello = self.connect()
-        if failure := failure_in(hello.get("failed")):
+        try:
+            hello = self.connect()
+        except BaseException:
             self.end()
-            raise failure
-        self.functions: dict[str, Any] = hello["functions"]
-        advance = bool(self.functions.get("advance"))
+            raise
+        others = {"models": hello["models"], "replaced": hello["replaced"]}
+        self.functions: dict[str, Any] = hello["functions"] | others
+        advance = self.functions.get("advance")
         self.surface = "engine" if solver.engine else "advance" if advance else "exercise"
         self.versions = {**solver.versions, **hello["versions"]}
         if self.kind == "javascript":
             self.versions["mini-racer"] = version("mini-racer")
 
-    def connect(self) -> Any:
-        try:
-            if not self.reuse():
-                self.begin()
-            hello = self.exchange({"open": self.order}, STARTING)
-        except BaseException:
-            self.end()
-            raise
-        if fits(hello, {"failed": FAILURE}) or fits(hello, HELLO):
-            return hello
-        raise self.intruded()
-
-    def reuse(self) -> bool:
+    def connect(self) -> Hello:
         idle = waiting.pop(self.key, None)
-        if idle is None or idle.process.poll() is not None:
-            return False
-        self.process, self.pieces, self.level, _ = idle
-        return True
+        if idle is not None and idle.process.poll() is None:
+            self.process, self.pieces, self.level, _ = idle
+        else:
+            self.begin()
+        hello = self.exchange({"open": self.order}, STARTING)
+        try:
+            if "failed" not in hello:
+                return HELLO.validate_python(hello)
+            failure = failure_in(FAILURE.validate_python(hello["failed"]))
+        except ValidationError:
+            raise self.intruded() from None
+        assert failure is not None
+        raise failure
 
     def begin(self) -> None:
         reason = ""
@@ -201,15 +198,10 @@ class SolverProcess:
         answers = self.exchange({"do": requests}, min(most + GRACE, total)).get("done")
         if not isinstance(answers, list) or len(answers) != len(requests):
             raise self.intruded()
-        results = []
-        for (command, _, _), answer in zip(requests, answers):
-            if fits(answer, {"failed": FAILURE}):
-                results.append(failure_in(answer["failed"]))
-                continue
-            try:
-                results.append(value_of(command, answer["done"]))
-            except (TypeError, ValueError, KeyError):
-                raise self.intruded() from None
+        try:
+            results = [value_of(request[0], answer) for request, answer in zip(requests, answers)]
+        except (TypeError, ValueError, KeyError):
+            raise self.intruded() from None
         kinds = {result.kind for result in results if isinstance(result, SolverFailed)}
         self.sound &= not {"timeout", "memory", "crashed"} & kinds
         return results
@@ -323,98 +315,91 @@ def protection() -> Level:
 
 # ---- the forms of what a guest answers ----------------------------------------------------------
 
-
-def fits(value: Any, form: Any) -> bool:
-    """Whether a value of JSON has a form: a type, a set of words, a predicate; [form], a list of
-    any length; (form, form), a list of just these; {name: form}, a table with at least these."""
-    if isinstance(form, type):
-        return type(value) is form  # so that no bool is an int
-    if isinstance(form, frozenset):
-        return type(value) is str and value in form
-    if isinstance(form, list):
-        return type(value) is list and all(fits(item, form[0]) for item in value)
-    if isinstance(form, tuple):
-        return type(value) is list and len(value) == len(form) and all(map(fits, value, form))
-    if isinstance(form, dict):
-        return type(value) is dict and all(fits(value.get(name), form[name]) for name in form)
-    return bool(form(value))
+# no bool, no text, no int that is longer than a float
+Number = Annotated[float, Field(strict=True)]
+Count = Annotated[int, Field(strict=True, ge=0, lt=2**31)]
+Place = Annotated[int, Field(strict=True, ge=-1, lt=2**31)]  # of a sphere; -1 for another
+Sphere = Annotated[list[Number], Field(min_length=12, max_length=12)]
+Contact = Annotated[list[Number], Field(min_length=19, max_length=19)]
 
 
-def is_number(x: Any) -> bool:
-    return type(x) is float or (type(x) is int and abs(x) < 2**1000)  # not longer than a float
+def must_be_a_call(call: list[Any]) -> list[Any]:
+    if [k for k, item in enumerate(call) if type(item) is str] != [0]:
+        raise ValueError("a call is the name of its function, then numbers")
+    return call
 
 
-def is_count(x: Any) -> bool:
-    return type(x) is int and 0 <= x < 2**31
+Verb = Literal["integrate", "collide", "wrap", "step"]
+Call = Annotated[list[Verb | Place | Number], AfterValidator(must_be_a_call)]
+Setting = StrictStr | StrictBool | StrictInt | StrictFloat | None
 
 
-def is_call(call: Any) -> bool:
-    names = ("integrate", "collide", "wrap", "step")
-    return type(call) is list and bool(call) and call[0] in names and all(map(is_number, call[1:]))
+class Failure(TypedDict):
+    # unavailable: it imports what is not there, or what a guest may not; waited: ended by the
+    # clock, before it had its processor time
+    kind: Literal[
+        "error", "timeout", "memory", "crashed", "refused", "diverged", "unavailable", "waited"
+    ]
+    what: StrictStr
+    line: Count
+    column: Count
 
 
-def is_functions(table: Any) -> bool:
-    others = {"models": optional(str), "replaced": [str]}
-    return fits(table, others) and all(type(table[name]) is bool for name in table.keys() - others)
+class Hello(TypedDict):
+    functions: dict[str, StrictBool]
+    models: StrictStr | None
+    replaced: list[StrictStr]
+    versions: dict[str, StrictStr]
 
 
-def optional(form: Any) -> Callable[[Any], bool]:
-    return lambda value: value is None or fits(value, form)
+class Answer(TypedDict):
+    states: list[list[Sphere]]
+    returned: StrictBool
+    strayed: StrictBool
+    strange: list[StrictStr]
+    kept: list[StrictStr]
+    calls: list[Call]
+    error: Failure | None
 
 
-def row(width: int) -> Callable[[Any], bool]:
-    return lambda value: type(value) is list and len(value) == width and all(map(is_number, value))
+class Readings(TypedDict):
+    readings: Count
+    seconds: Number
+    numbers: StrictStr
+    thrown: Failure | None
 
 
-FAILURE = {"kind": KINDS_OF_FAILURE, "what": str, "line": is_count, "column": is_count}
-HELLO = {
-    "functions": is_functions,
-    "versions": lambda table: type(table) is dict and fits([*table.values()], [str]),
+PLAYS = ("play", "ahead", "samples")
+FAILURE, HELLO = TypeAdapter(Failure), TypeAdapter(Hello)
+FORMS: dict[str, TypeAdapter[Any]] = {
+    "ask": TypeAdapter(Answer),
+    "accesses": TypeAdapter(list[tuple[Literal["r", "w"], Place, StrictStr, list[Count]]]),
+    "left": TypeAdapter(list[Sphere]),
+    "globals": TypeAdapter(list[Sphere] | None),
+    "contacts": TypeAdapter(list[Contact]),
+    "load": TypeAdapter(list[tuple[StrictStr, Setting, Setting]]),
+    "step": TypeAdapter(Number | None),  # s in V8
+    **dict.fromkeys(PLAYS, TypeAdapter(Readings)),
 }
-SETTING = optional(lambda value: type(value) in (str, bool, int, float))
-READINGS = {"readings": is_count, "seconds": is_number, "numbers": str}
-FORMS: dict[str, Any] = {
-    "ask": {
-        **{"states": [[row(12)]], "returned": bool, "strayed": bool, "strange": [str]},
-        **{"kept": [str], "calls": [is_call], "error": optional(FAILURE)},
-    },
-    "accesses": [(frozenset("rw"), int, str, [is_count])],
-    "left": [row(12)],
-    "globals": optional([row(12)]),
-    "contacts": [row(19)],
-    "load": [(str, SETTING, SETTING)],
-    **dict.fromkeys(("play", "ahead", "samples"), READINGS | {"thrown": optional(FAILURE)}),
-}
 
 
-def value_of(command: str, done: Any) -> Any:
-    """Of an answer: with numbers as floats and failures as exceptions; raises `ValueError` for
-    another form."""
-    if command == "step":
-        return float(done) if is_number(done) else 0.0  # s in V8
+def value_of(command: str, answer: Any) -> Any:
+    """Of an answer, with numbers as floats and failures as exceptions; raises `ValueError`,
+    `TypeError` or `KeyError` for another form."""
+    if "failed" in answer:
+        return failure_in(FAILURE.validate_python(answer["failed"]))
     if command not in FORMS:
         return None
-    if not fits(done, FORMS[command]):
-        raise ValueError("an answer has another form")
+    done = FORMS[command].validate_python(answer["done"])
     if command == "ask":
-        return done | {"states": floats(done["states"]), "error": failure_in(done["error"])}
-    if command in ("left", "globals", "contacts"):
-        return floats(done)
-    if "numbers" in done:
+        return done | {"error": failure_in(done["error"])}
+    if command in PLAYS:
         numbers = np.frombuffer(b64decode(done["numbers"], validate=True))
         return done | {"numbers": numbers, "thrown": failure_in(done["thrown"])}
     return done
 
 
-def floats(value: Any) -> Any:
-    """Lists of numbers; None stays."""
-    if type(value) is list:
-        return [floats(item) for item in value]
-    return None if value is None else float(value)
-
-
-def failure_in(failed: Any) -> SolverFailed | None:
-    """What a guest reports, which fits `FAILURE`; None if it is None."""
+def failure_in(failed: Failure | None) -> SolverFailed | None:
     if failed is None:
         return None
     what = with_hint(failed["what"])

@@ -4,18 +4,19 @@
   const RAPIER = module.exports.default || module.exports;
   // Walls stop fast disks unless continuous_steps is 0; `continuous` is for pairs of disks.
   const shipped = {
-    matched: false, friction: null, turning: true, sleeping: true, iterations: null, continuous: false,
+    matched: false, turning: true, sleeping: true, iterations: null, continuous: false,
     continuous_steps: null, pgs_iterations: null, soft_ccd: 0, hertz: null, prediction: null,
   };
   // The length unit is that of Box2D 3.1, matched, whose slop and margin are the same shares of theirs.
   const matched = {
-    matched: true, friction: null, turning: true, sleeping: false, iterations: 4, continuous: false, length_unit: 0.5,
+    matched: true, turning: true, sleeping: false, iterations: 4, continuous: false, length_unit: 0.5,
     continuous_steps: 1, pgs_iterations: 1, soft_ccd: 0, hertz: 120, prediction: 0.02,
   };
 
   globalThis.models = "disks walls gravity static forces rotation friction wrap";
   globalThis.create = (scene, dt) => {
-    const chosen = { ...profiles[scene.profile], ...scene.changed }, { restitution } = scene;
+    const chosen = { ...profiles[scene.profile], ...scene.changed };
+    const { restitution, own_friction: friction } = scene;  // null: the engine's own default
     const fixed = (i) => scene.mass[i] === Infinity;
     const space = new RAPIER.World(vector(scene.gravity));
     space.timestep = dt;
@@ -28,8 +29,6 @@
       maxCcdSubsteps: chosen.continuous_steps, numInternalPgsIterations: chosen.pgs_iterations,
       contact_natural_frequency: chosen.hertz, normalizedPredictionDistance: chosen.prediction,
     });
-    const stated = chosen.matched || scene.friction > 0 ? scene.friction : null;
-    const friction = chosen.friction === null ? stated : chosen.friction;
     const index = new Map();
     const add = (shape, body, i) => {
       shape.setRestitution(restitution).setDensity(0);

@@ -15,21 +15,13 @@ models = "disks walls gravity static forces rotation wrap"
 def create(scene, dt):
     """A new world for a scene, in steps of dt. A text instead of a world says why it cannot play
     the scene."""
-    disks = [
-        SimpleNamespace(
-            i=i,
-            x=scene.position[i][0],
-            y=scene.position[i][1],
-            u=scene.velocity[i][0],
-            v=scene.velocity[i][1],
-            angle=scene.angle[i],
-            spin=scene.angular_velocity[i],
-            radius=scene.radius[i],
-            light=1 / scene.mass[i],  # 0 for a disk that cannot move
-            easy=1 / scene.inertia[i],
-        )
-        for i in range(scene.n)
-    ]
+    disks = []
+    for i, (x, y) in enumerate(scene.position):
+        u, v = scene.velocity[i]
+        light, easy = 1 / scene.mass[i], 1 / scene.inertia[i]  # 0 for a disk that cannot move
+        d = SimpleNamespace(i=i, x=x, y=y, u=u, v=v, light=light, easy=easy, radius=scene.radius[i])
+        d.angle, d.spin = scene.angle[i], scene.angular_velocity[i]
+        disks.append(d)
     return SimpleNamespace(disks=disks, scene=scene, heard=[])
 
 

@@ -25,8 +25,8 @@ from crosscheck2d.reports.page.kit import (
     TableCell,
     Text,
     render_page,
+    sourced,
 )
-from crosscheck2d.reports.page.own_solvers import sourced
 from crosscheck2d.reports.page.replay import pack_layers, ratio_of
 from crosscheck2d.reports.run.made import sealed
 from crosscheck2d.reports.terminal.counts import listed

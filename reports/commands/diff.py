@@ -15,8 +15,8 @@ from typing import Any, NamedTuple, NoReturn
 import numpy as np
 import pandas as pd
 
+from crosscheck2d.reports.compare.comparison import COLUMNS
 from crosscheck2d.reports.compare.metrics import METRICS
-from crosscheck2d.reports.compare.table import COLUMNS
 from crosscheck2d.reports.compare.verdicts import VERDICTS
 from crosscheck2d.reports.compare.view import NOT_JUDGED, rounding_of
 from crosscheck2d.reports.run.results import COMMAND, RunResults

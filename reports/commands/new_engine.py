@@ -16,7 +16,7 @@ from crosscheck2d.reports.terminal.exits import refuse
 ENGINE = """{0} is an engine that works: put yours in its place. To judge it:
 crosscheck run bouncing_ball_e09 box_billiard --engine {0} --engine pymunk --out mine
 adapters/README.md explains its functions."""
-PORTED = """{0} runs as it is{1}. To judge it:
+PORTED = """{0} runs {1}. To judge it:
 crosscheck run head_on_equal_e1 gas_of_100 --engine {0} --engine pymunk --out mine
 What it says to crosscheck is in the class at its end; adapters/README.md explains it."""
 SOLVER = """{0} has the two functions of the exercise, which do nothing yet. To check them:
@@ -54,8 +54,7 @@ class Hints(NamedTuple):
 
 
 FIELDS = "x y vx vy r m"
-# What a file to fill in calls them; and where ball codes keep the size of their box.
-NAMES = {"box": "width height", "gravity": "gravity", "restitution": "restitution"}
+# Where ball codes keep the size of their box.
 BOXES = ("canvas.width canvas.height", "WIDTH HEIGHT", "width height", "W H")
 
 
@@ -64,8 +63,8 @@ def write_engine(path: Path, hints: Hints = Hints()) -> None:  # noqa: B008 - a 
     if hints == Hints():
         write_new(path, TEMPLATES[kind].read_text(encoding="utf-8"), ENGINE)
         return
-    within = "" if hints.source else ": put your code in place of its functions"
-    write_new(path, ported(kind, hints), PORTED.replace("{1}", within))
+    runs = "as it is" if hints.source else "once it has your code at its top"
+    write_new(path, ported(kind, hints), PORTED.replace("{1}", runs))
 
 
 def ported(kind: str, hints: Hints) -> str:
@@ -81,10 +80,7 @@ def ported(kind: str, hints: Hints) -> str:
     if not plain and hints.ball is None:
         refuse(f'--fields "{hints.fields}": --ball has to say how such a ball is made')
     code = code_in(hints.source, kind)
-    if code is None:
-        given = {name: value for name, value in hints._asdict().items() if value is not None}
-        hints = hints._replace(**(NAMES | given))
-    elif hints.box is None:
+    if code is not None and hints.box is None:
         words = set(re.findall(r"[\w.]+", code))
         hints = hints._replace(box=next((x for x in BOXES if {*x.split()} <= words), None))
     box = (hints.box or "").split()
@@ -93,9 +89,6 @@ def ported(kind: str, hints: Hints) -> str:
     for option, value in (("--pixels", hints.pixels), ("--per-frame", hints.per_frame)):
         if value is not None and not 0 < value < 1e9:
             refuse(f"{option} {value:g}: must be above 0")
-    move, collide = hints.move or "move", hints.collide or "collide"
-    if hints.source is None and (hints.step or not (move + collide).isidentifier()):
-        refuse("--step, a method or a call as --move or --collide: --from has to name the code")
     try:
         restitution, variable = f"{float(hints.restitution or 1):g}", None
     except ValueError:
@@ -106,21 +99,15 @@ def ported(kind: str, hints: Hints) -> str:
         for name in settable:  # each scene sets it
             code = re.sub(rf"\bconst\b(?=[^;\n]*\b{name}\s*=[^=])", "let", code)
     dt = [] if hints.per_frame else ["dt"]
-    masses = [f"{x}{fields[5]}" if fields[5:] else "1" for x in "ab"]
     template = AROUND[kind].read_text(encoding="utf-8")
     return environment().overlay(autoescape=False).from_string(template).render(
         **dict(zip(FIELDS.split(), [*fields, ""])),
         fields=[*zip(FIELDS.split(), fields)],
         code=code,
         ball=hints.ball or {"javascript": "{}", "python": "SimpleNamespace()"}[kind],
-        move=move,
-        collide=collide,
-        move_call=call(move, ["ball"], dt),
-        collide_call=call(collide, ["a", "b"], []),
+        move_call=call(hints.move or "move", ["ball"], dt),
+        collide_call=call(hints.collide or "collide", ["a", "b"], []),
         step=hints.step and call(hints.step, [], dt),
-        times_dt="" if hints.per_frame else " * dt",
-        mass_a=masses[0],
-        mass_b=masses[1],
         restitution=restitution,
         restitution_name=variable,
         settable=settable,

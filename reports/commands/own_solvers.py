@@ -12,7 +12,7 @@ from typing import Any
 from crosscheck2d.adapters.engines import OWN
 from crosscheck2d.reports.check.evidence import lines_and_formula
 from crosscheck2d.reports.check.verdict import check_file
-from crosscheck2d.reports.page.own_solvers import Said, with_lines
+from crosscheck2d.reports.page.kit import Said, with_lines
 from crosscheck2d.reports.run.pool import Failure, run_all
 from crosscheck2d.reports.run.suite import Check
 from crosscheck2d.reports.terminal.exits import say

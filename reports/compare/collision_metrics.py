@@ -6,6 +6,8 @@ Each is a row of `METRICS` (metrics.py), with the sentence that says what it is.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from crosscheck2d.reports.compare import laws
@@ -162,16 +164,16 @@ def first_wrong_collision_s(view: View) -> Value | None:
 
 def collision_delay_dt(view: View) -> Value | None:
     delay = view.matched.delay
-    if not len(delay):
-        return None
-    return Value(float(np.median(delay)) / view.dt, note=f"{len(delay)} collisions")
+    return _in_dt(np.median(delay), view) if len(delay) else None
 
 
 def collision_delay_max_dt(view: View) -> Value | None:
     delay = view.matched.delay
-    if not len(delay):
-        return None
-    return Value(float(np.abs(delay).max()) / view.dt, note=f"{len(delay)} collisions")
+    return _in_dt(np.abs(delay).max(), view) if len(delay) else None
+
+
+def _in_dt(delay: Any, view: View) -> Value:
+    return Value(float(delay) / view.dt, note=f"{len(view.matched.delay)} collisions")
 
 
 def _carried(view: View) -> str:

@@ -148,19 +148,12 @@ def thrown_off(played: Trajectory, true: Trajectory, scene: Scene) -> tuple[floa
 
 @dataclass(frozen=True, eq=False)
 class Matched:
-    """Collisions of an engine set against collisions of the truth.
+    """Collisions of an engine set against collisions of the truth."""
 
-    Attributes:
-        delay: (m,) s, engine time minus true time of each collision found.
-        missed: (time s, i, j) of true collisions not found.
-        spurious: (time s, i, j) of engine collisions that the truth lacks.
-        judged: how many true collisions would count as missed if they were not found.
-    """
-
-    delay: Array
-    missed: list[tuple[float, int, int]]
-    spurious: list[tuple[float, int, int]]
-    judged: int
+    delay: Array  # (m,) s, engine time minus true time of each collision found
+    missed: list[tuple[float, int, int]]  # (time s, i, j) of true collisions not found
+    spurious: list[tuple[float, int, int]]  # of engine collisions that the truth lacks
+    judged: int  # how many true collisions would count as missed if they were not found
 
     @property
     def first_wrong(self) -> tuple[float, str] | None:

@@ -1,4 +1,9 @@
-"""Compare the runs of one scenario with the truth and with each other, in one table."""
+"""Compare the runs of one scenario with the truth and with each other, in one tidy table,
+deviations.csv: a row for each number, with its run and what it is measured against.
+
+A verdict fails above its bound, other numbers have none. A value is NaN only where it is not
+judged, and in the row of a run without numbers; the note says why.
+"""
 
 from __future__ import annotations
 
@@ -12,17 +17,16 @@ from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.compare.against import ENGINE, ITSELF, TRUTH
 from crosscheck2d.reports.compare.delays import jumps_of
 from crosscheck2d.reports.compare.metrics import METRICS
-from crosscheck2d.reports.compare.table import (
-    TableRow,
-    deviation_row,
-    status_row,
-    table_of,
-    verdict_row,
-)
-from crosscheck2d.reports.compare.verdicts import verdicts_on
-from crosscheck2d.reports.compare.view import View, beside, not_judged
+from crosscheck2d.reports.compare.verdicts import Verdict, verdicts_on
+from crosscheck2d.reports.compare.view import Value, View, beside, not_judged
 from crosscheck2d.scenarios.model import Scenario, Trajectory
 from crosscheck2d.scenarios.no_truth import answered
+
+COLUMNS = (
+    *("scenario", "engine", "profile", "dt_s"),
+    *("metric", "disk", "value", "unit", "versus", "at_s", "note", "bound"),
+)
+TableRow = tuple[str, str, str, float, str, int, float, str, str, float, str, float]  # as `COLUMNS`
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,5 +77,31 @@ def _measure(run: Run, view: View, versus: str) -> list[TableRow]:
         for name, metric in METRICS.items():
             if kind in metric.against and (value := metric.of(view)) is not None:
                 judged = value if len(view.played) > 1 else not_judged("the start alone")
-                rows.append(deviation_row(run, name, judged, metric.unit, versus))
+                rows.append(table_row(run, name, judged, metric.unit, versus))
     return rows
+
+
+def table_row(
+    run: Run, metric: str, value: Value, unit: str, versus: str, bound: float = np.nan
+) -> TableRow:
+    """The row of one number of a run; what is judged and no number is infinitely far off."""
+    number = np.inf if value.judged and np.isnan(value.value) else value.value
+    cell = (run.scenario, run.engine, run.profile, run.dt)
+    return (*cell, metric, value.disk, number, unit, versus, value.at, value.note, bound)
+
+
+def verdict_row(run: Run, verdict: Verdict) -> TableRow:
+    """The row of one verdict on a run; the note has the second disk, or the wall."""
+    disk, *others = verdict.disks or (-1,)
+    note = ", ".join(f"with disk {k}" if k >= 0 else f"with wall {-1 - k}" for k in others)
+    value = Value(verdict.value, disk, verdict.at, note)
+    return table_row(run, verdict.id, value, verdict.unit, ITSELF, verdict.bound)
+
+
+def status_row(run: Run, reason: str, versus: str = ITSELF) -> TableRow:
+    """The row of a run without numbers, with the reason."""
+    return table_row(run, "status", Value(np.nan, note=reason, judged=False), "", versus)
+
+
+def table_of(rows: Sequence[TableRow]) -> pd.DataFrame:
+    return pd.DataFrame(rows, columns=list(COLUMNS))

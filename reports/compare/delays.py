@@ -24,24 +24,14 @@ SWEEPS = 100
 
 class Jumps(NamedTuple):
     """What each of the h collisions of a truth changes, in order of time; those that change nothing
-    are left out.
+    are left out."""
 
-    Attributes:
-        t: (h,) s.
-        impulse: (h, 2) N s on all disks together: from walls and static disks; 0 between two moving
-            disks.
-        energy: (h,) J lost.
-        limits: (n + 1,) where the rows of each disk begin in `when` and `change`.
-        when: (d,) s, times of the collisions, disk by disk.
-        change: (d, 2) m/s, change of velocity of that disk.
-    """
-
-    t: Array
-    impulse: Array
-    energy: Array
-    limits: np.ndarray
-    when: Array
-    change: Array
+    t: Array  # (h,) s
+    impulse: Array  # (h, 2) N s from walls and static disks; 0 between two moving disks
+    energy: Array  # (h,) J lost
+    limits: np.ndarray  # (n + 1,) where the rows of each disk begin in `when` and `change`
+    when: Array  # (d,) s, times of the collisions, disk by disk
+    change: Array  # (d, 2) m/s, change of velocity of that disk
 
 
 @laws.cached

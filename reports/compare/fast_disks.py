@@ -3,11 +3,10 @@ and whether an engine caps its speed."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 
-from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.compare import laws
 from crosscheck2d.reports.compare.comparison import Comparison
 from crosscheck2d.scenarios.model import Array, Scene
@@ -18,43 +17,30 @@ SPEED_CAP = "speed cap in m/s"  # the setting of engines that have one and tell 
 
 
 def fast_note(comparison: Comparison) -> str:
-    """A sentence on the step sizes at which a disk can pass through another, and on the engines
-    that cap speeds below the scene's; "" if there is neither."""
-    fastest = largest(comparison, lambda velocity: float(laws.lengths(velocity).max()))
-    return " ".join([*passing(comparison), *capped(comparison.runs, fastest)])
-
-
-def passing(comparison: Comparison) -> list[str]:
-    """At most one sentence: the coarsest step size at which a disk can pass through another or a
-    wall, and one at which it cannot."""
-    scenario = comparison.scenario
+    """Sentences on the coarsest step size at which a disk can pass through another or a wall, and
+    on the engines that keep disks below the scene's largest speed; "" if there is neither."""
+    scenario, sentences = comparison.scenario, []
     dt = scenario.dt(min(scenario.substeps))
     ratio = dt * largest(comparison, lambda velocity: approach(scenario.scene, velocity))
-    if ratio <= 1.0:
-        return []
-    return [
-        f"In a step of {plain(dt, 4)} s two disks, or a disk and a wall, can approach by"
-        f" {plain(ratio, 2)} times the distance at which they touch. In an engine that tests for"
-        " overlap at the end of a step one can pass through the other (tunnelling). With steps of"
-        f" {plain(rounded_down(dt / ratio))} s it cannot."
-    ]
-
-
-def capped(runs: Sequence[Run], fastest: float) -> list[str]:
-    """At most one sentence: the engines that kept disks slower than `fastest` m/s, at the coarsest
-    step size at which one did."""
+    if ratio > 1.0:
+        sentences.append(
+            f"In a step of {plain(dt, 4)} s two disks, or a disk and a wall, can approach by"
+            f" {plain(ratio, 2)} times the distance at which they touch. In an engine that tests"
+            " for overlap at the end of a step one can pass through the other (tunnelling). With"
+            f" steps of {plain(rounded_down(dt / ratio))} s it cannot."
+        )
+    fastest = largest(comparison, lambda velocity: float(laws.lengths(velocity).max()))
     caps: dict[float, list[str]] = {}
-    for run in runs:
+    for run in comparison.runs:
         cap = run.settings.get(SPEED_CAP, (None, None))[1]
         if run.status == "ok" and isinstance(cap, (int, float)) and cap < ROUNDED * fastest:
             caps.setdefault(run.dt, []).append(f"{run.name} {plain(cap)} m/s")
-    if not caps:
-        return []
-    dt = max(caps)
-    return [
-        f"The fastest disk has {plain(fastest)} m/s; in steps of {plain(dt, 4)} s some engines"
-        f" allow less: {', '.join(caps[dt])}."
-    ]
+    if caps:
+        sentences.append(
+            f"The fastest disk has {plain(fastest)} m/s; in steps of {plain(max(caps), 4)} s some"
+            f" engines allow less: {', '.join(caps[max(caps)])}."
+        )
+    return " ".join(sentences)
 
 
 def largest(comparison: Comparison, of: Callable[[Array], float]) -> float:

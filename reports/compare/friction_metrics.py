@@ -6,6 +6,8 @@ that says what it is.
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from itertools import product
 from math import ceil
 from typing import NamedTuple
 
@@ -27,30 +29,23 @@ GONE = 0.05
 def tangential_velocity_error(view: View) -> Value | None:
     if not has_friction(view):
         return None
-    scenario, truth = view.scenario, view.reference
-    free, along = collision_free(truth, view.dt), tangents(truth, scenario)
-    collisions = truth.collisions
-    worst, carried = Value(0.0), 0
-    for t, i, j, impulse, tangent in zip(
-        collisions.t, collisions.i, collisions.j, collisions.impulse, along
-    ):
-        if not impulse:  # a contact that lasts
-            continue
-        k = int(np.searchsorted(truth.t, t + WINDOW * view.dt, "right"))
-        for disk in (int(i), int(j)):
-            if disk < 0 or view.scene.static[disk] or k >= len(truth) or not free[k, disk]:
-                continue
-            carried += 1
-            error = (view.played.velocity[k, disk] - truth.velocity[k, disk]) @ tangent
-            if abs(error) > worst.value:
-                worst = Value(float(abs(error)), disk, float(truth.t[k]))
-    return over_collisions(worst, carried, view)
+    truth, collisions = view.reference, view.reference.collisions
+    free, along = collision_free(truth, view.dt), tangents(truth, view.scenario)
+    after = np.searchsorted(truth.t, collisions.t + WINDOW * view.dt, "right")
+    errors = []
+    for row in np.flatnonzero(collisions.impulse):  # without it: a contact that lasts
+        k = int(after[row])
+        for disk in (int(collisions.i[row]), int(collisions.j[row])):
+            if disk >= 0 and not view.scene.static[disk] and k < len(truth) and free[k, disk]:
+                error = (view.played.velocity[k, disk] - truth.velocity[k, disk]) @ along[row]
+                errors.append(Value(float(abs(error)), disk, float(truth.t[k])))
+    return over_collisions(worst_of(errors), len(errors), view)
 
 
 def friction_impulse_error(view: View) -> Value | None:
     if not has_friction(view):
         return None
-    truth, worst, carried = view.reference, Value(0.0), 0
+    truth, errors = view.reference, []
     weight = laws.moving_inertia(view.scene) / view.scene.radius
     for disks, _, before, after in isolated_collisions(truth, view.scenario, view.dt):
         for disk in disks:
@@ -58,11 +53,13 @@ def friction_impulse_error(view: View) -> Value | None:
                 motion.angular_velocity[after, disk] - motion.angular_velocity[before, disk]
                 for motion in (view.played, truth)
             )
-            carried += 1
             error = float(weight[disk] * abs(turned - expected))
-            if error > worst.value:
-                worst = Value(error, disk, float(truth.t[after]))
-    return over_collisions(worst, carried, view)
+            errors.append(Value(error, disk, float(truth.t[after])))
+    return over_collisions(worst_of(errors), len(errors), view)
+
+
+def worst_of(errors: Sequence[Value]) -> Value:
+    return max([Value(0.0), *errors], key=lambda error: error.value)
 
 
 def friction_loss_error(view: View) -> Value | None:
@@ -76,38 +73,32 @@ def restitution_loss_error(view: View) -> Value | None:
 def loss_error(view: View, of_friction: bool) -> Value | None:
     """Energy lost by the engine minus that of the truth, over all collisions that can be read off
     two samples. Friction takes it from the tangential motion and the spins, restitution from the
-    normal motion."""
+    normal motion; each includes the potential energy along its own axis, and so is constant in
+    flight."""
     scenario, scene = view.scenario, view.scene
     if not has_friction(view) or scenario.thrusts or scales.lifts(scenario):
         return None
     isolated = isolated_collisions(view.reference, scenario, view.dt)
-    losses = np.array(
-        [
-            [energy_lost(motion, scene, collision, of_friction) for collision in isolated]
-            for motion in (view.played, view.reference)
-        ]
+
+    def energy_lost(motion: Trajectory, collision: Isolated) -> float:
+        disks, (x, y) = collision.disks, collision.tangent
+        axis = collision.tangent if of_friction else np.array([-y, x])
+        at = np.array([collision.before, collision.after])[:, None], disks
+        speed, place = motion.velocity[at] @ axis, motion.position[at] @ axis
+        energy = (speed**2 / 2 - scene.gravity @ axis * place) @ laws.moving_mass(scene)[disks]
+        if of_friction:
+            spin = motion.angular_velocity[at]
+            energy = energy + spin**2 / 2 @ laws.moving_inertia(scene)[disks]
+        return float(energy[0] - energy[1])
+
+    own, exact = (
+        np.array([energy_lost(motion, collision) for collision in isolated])
+        for motion in (view.played, view.reference)
     )
     scale = scales.energy(scenario) or 1.0
-    off = (losses[0] - losses[1]).sum() / scale
-    note = f"{losses[1].sum() / scale:.2g} in {len(isolated)} collisions of the exact answer"
+    note = f"{exact.sum() / scale:.2g} in {len(isolated)} collisions of the exact answer"
     carried = sum(len(collision.disks) for collision in isolated)
-    return over_collisions(Value(float(off), note=note), carried, view)
-
-
-def energy_lost(motion: Trajectory, scene: Scene, collision: Isolated, along: bool) -> float:
-    """J that a collision takes from the tangential motion and the spins, or from the normal motion.
-
-    Each includes the potential energy along its own axis, and so is constant in flight.
-    """
-    axis = collision.tangent if along else np.array([-collision.tangent[1], collision.tangent[0]])
-    disks = collision.disks
-    at = np.array([collision.before, collision.after])[:, None], disks
-    speed, place = motion.velocity[at] @ axis, motion.position[at] @ axis
-    energy = (speed**2 / 2 - scene.gravity @ axis * place) @ laws.moving_mass(scene)[disks]
-    if along:
-        spin = motion.angular_velocity[at]
-        energy = energy + spin**2 / 2 @ laws.moving_inertia(scene)[disks]
-    return float(energy[0] - energy[1])
+    return over_collisions(Value(float((own - exact).sum() / scale), note=note), carried, view)
 
 
 def has_friction(view: View) -> bool:
@@ -130,17 +121,11 @@ def over_collisions(value: Value, carried: int, view: View) -> Value:
 
 
 class Isolated(NamedTuple):
-    """A collision of the truth between two samples, with no other collision of its disks between
-    them.
+    """A collision of the truth between two samples, each more than 3.2 steps from all collisions of
+    its disks, with no other collision of these between them."""
 
-    Attributes:
-        disks: (d,) the moving disks of the pair.
-        tangent: (2,) of length 1, along the surfaces.
-        before, after: the samples, each more than 3.2 steps from all collisions of these disks.
-    """
-
-    disks: list[int]
-    tangent: Array
+    disks: list[int]  # those of the pair that move
+    tangent: Array  # (2,) of length 1, along the surfaces
     before: int
     after: int
 
@@ -189,41 +174,41 @@ def isolated_collisions(truth: Trajectory, scenario: Scenario, dt: float) -> lis
 def slip_at_rest(view: View) -> Value | None:
     if not view.scene.friction or view.jumps is None:
         return None
-    truth, worst, rested = view.reference, Value(0.0), False
+    truth, slips = view.reference, []
     late = ceil(WINDOW * view.dt / view.scenario.sample_interval)
-    for disk in np.flatnonzero(~view.scene.static).tolist():
-        for wall in range(len(view.scene.walls)):
-            exact, _, rolls = slide(truth, view.scene, disk, wall)
-            lasts = rolls & np.append(np.zeros(late, bool), rolls)[: len(rolls)]
+    for disk, wall in pairs(view.scene):
+        exact, _, rolls = slide(truth, view.scene, disk, wall)
+        lasts = rolls & np.append(np.zeros(late, bool), rolls)[: len(rolls)]
+        if lasts.any():
             slip = np.abs(slide(view.played, view.scene, disk, wall)[0] - exact)
             slip = np.where(lasts, slip, 0)
             k = int(np.argmax(slip))
-            rested |= bool(lasts.any())
-            if slip[k] > worst.value:
-                worst = Value(float(slip[k]), disk, float(truth.t[k]))
-    return worst if rested else None
+            slips.append(Value(float(slip[k]), disk, float(truth.t[k])))
+    return worst_of(slips) if slips else None
 
 
 def time_to_roll_error_s(view: View) -> Value | None:
     if not view.scene.friction or view.jumps is None:
         return None
-    truth, scene = view.reference, view.scene
-    worst: Value | None = None
-    for disk in np.flatnonzero(~scene.static).tolist():
-        for wall in range(len(scene.walls)):
-            exact, touches, rolls = slide(truth, scene, disk, wall)
-            slips = touches & ~rolls
-            for begins in np.flatnonzero(rolls[1:] & slips[:-1]) + 1:
-                first = begins - int(np.argmin(np.append(slips[:begins][::-1], False)))
-                if begins - first < 2:  # samples from which the end of the slip is extrapolated
-                    continue
-                slip, _, _ = slide(view.played, scene, disk, wall)
-                time = end_of_slip(view.played.t[first:], slip[first:])
-                expected = end_of_slip(truth.t[first:], exact[first:])
-                note = "" if np.isfinite(time) else "at least: it slips to the end"
-                off = Value(min(time, truth.t[-1]) - expected, disk, float(expected), note)
-                worst = max(worst or off, off, key=lambda error: abs(error.value))
-    return worst
+    truth, scene, errors = view.reference, view.scene, []
+    for disk, wall in pairs(scene):
+        exact, touches, rolls = slide(truth, scene, disk, wall)
+        slips = touches & ~rolls
+        for begins in np.flatnonzero(rolls[1:] & slips[:-1]) + 1:
+            first = begins - int(np.argmin(np.append(slips[:begins][::-1], False)))
+            if begins - first < 2:  # samples from which the end of the slip is extrapolated
+                continue
+            slip, _, _ = slide(view.played, scene, disk, wall)
+            time = end_of_slip(view.played.t[first:], slip[first:])
+            expected = end_of_slip(truth.t[first:], exact[first:])
+            note = "" if np.isfinite(time) else "at least: it slips to the end"
+            errors.append(Value(min(time, truth.t[-1]) - expected, disk, float(expected), note))
+    return max(errors, key=lambda error: abs(error.value), default=None)
+
+
+def pairs(scene: Scene) -> Iterator[tuple[int, int]]:
+    """Every disk that moves, with every wall."""
+    return product(np.flatnonzero(~scene.static).tolist(), range(len(scene.walls)))
 
 
 def end_of_slip(t: Array, slip: Array) -> float:

@@ -193,23 +193,12 @@ def _largest_of_disks(values: Array, view: View) -> Value:
 
 @dataclass(frozen=True)
 class Metric:
-    """A row of `ROWS`.
-
-    Attributes:
-        of: the function; its name is that of the metric.
-        unit: of the value; "1" for a ratio.
-        against: what it is measured against: `ITSELF`, `TRUTH`, `ENGINE` (against.py).
-        title: the heading in tables; "": the name itself.
-        summary: what the number is; `crosscheck list metrics` prints it.
-        better: the best value: "lower", "higher", "zero", or "as stated" where none is best.
-    """
-
-    of: Callable[[View], Value | None]
-    unit: str
-    against: tuple[str, ...]
-    title: str = ""
-    summary: str = ""
-    better: str = "lower"
+    of: Callable[[View], Value | None]  # its name is that of the metric
+    unit: str  # "1" for a ratio
+    against: tuple[str, ...]  # `ITSELF`, `TRUTH`, `ENGINE` (against.py)
+    title: str = ""  # the heading in tables; "": the name itself
+    summary: str = ""  # what the number is; `crosscheck list metrics` prints it
+    better: str = "lower"  # or "higher", "zero", "as stated" where none is best
 
 
 BESIDE = (TRUTH, ENGINE)

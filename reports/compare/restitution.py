@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -12,25 +13,12 @@ from crosscheck2d.scenarios.model import Array, Scene, Trajectory
 
 
 class Restitutions(NamedTuple):
-    """What was read off the samples.
-
-    Attributes:
-        values: (m,) e of each collision that was read.
-        spread: (m,) by how much e depends on when in its step the collision was.
-        times: (m,) s, the end of that step.
-        below: how many were below the floor, or, with friction, only graze.
-        unfinished: how many did not end before the next collision of a disk, or before the end of
-            the run.
-        unclear: how many were not alone, too slow for the gravity that acts, or do not have the
-            change of velocity of one collision.
-    """
-
-    values: Array
-    spread: Array
-    times: Array
-    below: int
-    unfinished: int
-    unclear: int = 0
+    values: Array  # (m,) e of each collision that was read
+    spread: Array  # (m,) by how much e depends on when in its step the collision was
+    times: Array  # (m,) s, the end of that step
+    below: int  # how many were below the floor, or, with friction, only graze
+    unfinished: int  # did not end before the next collision of a disk, or before the end of the run
+    unclear: int = 0  # not alone, too slow for gravity, or not the change of one collision
 
 
 # relative to the change of velocity; float32 leaves about 1e-7 of the velocity, an unreported
@@ -80,7 +68,7 @@ def effective_restitution(
     with the same relative rounding. Engines report such collisions during a lasting contact: Box2D
     3.1 does so when a disk slides along a wall and approaches it at any speed.
     """
-    t, spin, collisions = trajectory.t, trajectory.angular_velocity, on_faces(trajectory, scene)
+    t, collisions = trajectory.t, on_faces(trajectory, scene)
     slowest = max(slowest, 0.0)
     # A collision at the instant of a sample, at the end of its step, belongs to the interval that
     # ends there.
@@ -88,19 +76,19 @@ def effective_restitution(
     i, j = collisions.i, collisions.j
     fixed = scene.static[i]  # then the second is the disk that moves
     every = Pairs(before, np.where(fixed, j, i), np.where(fixed, i, j), collisions.t)
-    count = in_intervals(every, len(t), scene.n)
+    reader = Reader(trajectory, scene, rounding, in_intervals(every, len(t), scene.n))
     within = every.of((before >= 0) & (before < len(t) - 1) & (every.i >= 0))
-    read = within.of(is_alone(within, count))
-    noise = is_rounding(trajectory, scene, read, rounding)
+    read = within.of(reader.is_alone(within))
+    noise = reader.is_rounding(read)
     read = read.of(~noise)
-    after, held = first_apart(trajectory, scene, read, count, rounding)
+    after, held = reader.first_apart(read)
     over = after < len(t)
     read, after, held = read.of(over), after[over], held[over]
-    disks = np.stack([read.i, read.other], axis=1)
-    turned = spin[after[:, None], disks] - spin[read.k[:, None], disks]
-    falls = [acceleration(trajectory, scene, read, k, count) for k in (read.k - 1, after)]
-    earlier = velocities(trajectory, read, read.k, falls[0])
-    later = velocities(trajectory, read, after, falls[1])
+    spin = trajectory.angular_velocity
+    turned = spin[after[:, None], read.disks] - spin[read.k[:, None], read.disks]
+    falls = [reader.acceleration(read, k) for k in (read.k - 1, after)]
+    earlier = reader.velocities(read, read.k, falls[0])
+    later = reader.velocities(read, after, falls[1])
     closing, separating, normal = speeds_along_normal(earlier, later, scene, read, turned)
     closing, separating = np.where(held > 0, [held, 0 * held], [closing, separating])
     gained, lost = (-np.vecdot(fall[:, 0] - fall[:, 1], normal) * dt for fall in falls)
@@ -113,7 +101,7 @@ def effective_restitution(
     late = (closing > slowest) & ~fast & ~grazes
     lies = closing <= slowest / 5  # the weight of a disk that lies
     below, unfinished = int(noise.sum() + grazes.sum()), int((~over).sum() + late.sum())
-    still = velocities(trajectory, read, after, 0 * falls[1])
+    still = reader.velocities(read, after, 0 * falls[1])
     lying = np.vecdot(still[:, 0] - still[:, 1], normal)
     lying = np.where((after == len(t) - 1) & (held == 0), lying, separating)
     first, third = separating[fast] / closing[fast], lying[fast] / closing[fast]
@@ -130,27 +118,25 @@ def effective_restitution(
 
 
 class Pairs(NamedTuple):
-    """m collisions.
+    """m collisions."""
 
-    Attributes:
-        k: (m,) the last sample before each.
-        i: (m,) a disk.
-        j: (m,) a disk, or a wall (-1: the first).
-        when: (m,) s.
-    """
-
-    k: np.ndarray
-    i: np.ndarray
-    j: np.ndarray
-    when: Array
+    k: np.ndarray  # (m,) the last sample before each
+    i: np.ndarray  # (m,) a disk
+    j: np.ndarray  # (m,) a disk, or a wall (-1: the first)
+    when: Array  # (m,) s
 
     def of(self, chosen: np.ndarray) -> Pairs:
         return Pairs(*(column[chosen] for column in self))
 
     @property
-    def other(self) -> np.ndarray:
-        """(m,) the second disk; the first disk again if the other side is a wall."""
-        return np.where(self.j >= 0, self.j, self.i)
+    def disks(self) -> np.ndarray:
+        """(m, 2) both disks; the first disk twice if the other side is a wall."""
+        return np.stack([self.i, np.where(self.j >= 0, self.j, self.i)], axis=1)
+
+    def moves(self, scene: Scene) -> np.ndarray:
+        """(m, 2) whether each side is a disk that moves."""
+        is_disk = np.stack([self.i >= 0, self.j >= 0], axis=1)
+        return np.asarray(~scene.static[self.disks] & is_disk)
 
 
 def in_intervals(every: Pairs, samples: int, n: int) -> np.ndarray:
@@ -163,124 +149,104 @@ def in_intervals(every: Pairs, samples: int, n: int) -> np.ndarray:
     return count
 
 
-def is_alone(read: Pairs, count: np.ndarray) -> np.ndarray:
-    """(m,) whether neither disk has another collision in the same interval or the next."""
-    one, two = (
-        (count[read.k + 1, disk] == 1) & (count[read.k + 2, disk] == 0)
-        for disk in (read.i, read.other)
-    )
-    alone: np.ndarray = one & two
-    return alone
+@dataclass(frozen=True, eq=False)
+class Reader:
+    """Reads collisions off a trajectory; `count` as from `in_intervals`. A sample k is (m,), one
+    for each pair."""
 
+    trajectory: Trajectory
+    scene: Scene
+    rounding: float
+    count: np.ndarray
 
-def first_apart(
-    trajectory: Trajectory, scene: Scene, read: Pairs, count: np.ndarray, rounding: float
-) -> tuple[np.ndarray, Array]:
-    """(m,) the first sample after each collision at which the two do not approach, or are held; the
-    number of samples if there is none before another collision of either. (m,) m/s, the closing
-    speed of those that are held, else 0."""
-    samples, after = len(trajectory), read.k + 1
-    held = np.zeros(len(after))
-    left = np.arange(len(after))  # the pairs that approach at every sample so far
-    while len(left):
-        left = left[approach(trajectory, scene, read.of(left), after[left], rounding)]
-        held[left] = held_speed(trajectory, scene, read.of(left), after[left])
-        left = left[held[left] == 0]
-        pairs, following = read.of(left), after[left] + 1
-        again = (count[following + 1, pairs.i] > 0) | (count[following + 1, pairs.other] > 0)
-        after[left] = np.where(again, samples, following)
-        left = left[after[left] < samples]
-    return after, held
+    def is_alone(self, pairs: Pairs) -> np.ndarray:
+        """(m,) whether neither disk has another collision in the same interval or the next."""
+        k, disks = pairs.k[:, None], pairs.disks
+        alone = (self.count[k + 1, disks] == 1) & (self.count[k + 2, disks] == 0)
+        return np.asarray(alone.all(axis=1))
 
+    def first_apart(self, read: Pairs) -> tuple[np.ndarray, Array]:
+        """(m,) the first sample after each collision at which the two do not approach, or are held;
+        the number of samples if there is none before another collision of either. (m,) m/s, the
+        closing speed of those that are held, else 0."""
+        samples, after = len(self.trajectory), read.k + 1
+        held = np.zeros(len(after))
+        left = np.arange(len(after))  # the pairs that approach at every sample so far
+        while len(left):
+            left = left[self.approach(read.of(left), after[left])]
+            held[left] = self.held_speed(read.of(left), after[left])
+            left = left[held[left] == 0]
+            pairs, following = read.of(left), after[left] + 1
+            again = (self.count[following[:, None] + 1, pairs.disks] > 0).any(axis=1)
+            after[left] = np.where(again, samples, following)
+            left = left[after[left] < samples]
+        return after, held
 
-def held_speed(trajectory: Trajectory, scene: Scene, pairs: Pairs, k: np.ndarray) -> Array:
-    """(m,) m/s, the closing speed of those whose velocities approach at sample k, (m,), and at the
-    next, but who come nearer by less than half of that, or than `STOPPED` of their closing speed;
-    else 0."""
-    nexts = np.minimum(k + 1, len(trajectory) - 1)
-    gaps, speeds = [], []
-    for sample in (pairs.k, k, nexts):
-        way = separation(trajectory, scene, pairs, sample)
-        v = velocities(trajectory, pairs, sample, np.zeros((len(k), 2, 2)))
-        gaps.append(laws.lengths(way))
-        speeds.append(-np.vecdot(way, v[:, 0] - v[:, 1]) / np.maximum(gaps[-1], TINY))
-    least = np.minimum(speeds[1], speeds[2])
-    nearer = (gaps[1] - gaps[2]) / interval(trajectory)
-    held = (nexts > k) & (least > 0) & (nearer < np.maximum(least / 2, STOPPED * speeds[0]))
-    return np.where(held, np.maximum(speeds[0], 0.0), 0.0)
+    def approach(self, pairs: Pairs, k: np.ndarray) -> np.ndarray:
+        """(m,) whether the two still approach, by more than `FLOOR` roundings."""
+        way, v = self.separation(pairs, k), self.velocities(pairs, k, self.falling(pairs))
+        floor = FLOOR * self.rounding * laws.lengths(v).sum(axis=1)
+        nearing: np.ndarray = np.vecdot(way, v[:, 0] - v[:, 1]) < -floor * laws.lengths(way)
+        return nearing
 
+    def held_speed(self, pairs: Pairs, k: np.ndarray) -> Array:
+        """(m,) m/s, the closing speed of those whose velocities approach at sample k and at the
+        next, but who come nearer by less than half of that, or than `STOPPED` of their closing
+        speed; else 0."""
+        nexts = np.minimum(k + 1, len(self.trajectory) - 1)
+        gaps, speeds = [], []
+        for sample in (pairs.k, k, nexts):
+            way = self.separation(pairs, sample)
+            v = self.velocities(pairs, sample, np.zeros((len(k), 2, 2)))
+            gaps.append(laws.lengths(way))
+            speeds.append(-np.vecdot(way, v[:, 0] - v[:, 1]) / np.maximum(gaps[-1], TINY))
+        least = np.minimum(speeds[1], speeds[2])
+        nearer = (gaps[1] - gaps[2]) / interval(self.trajectory)
+        held = (nexts > k) & (least > 0) & (nearer < np.maximum(least / 2, STOPPED * speeds[0]))
+        return np.where(held, np.maximum(speeds[0], 0.0), 0.0)
 
-def separation(trajectory: Trajectory, scene: Scene, pairs: Pairs, k: np.ndarray) -> Array:
-    """(m, 2) m, from the second of each pair to the first in sample k, (m,)."""
-    x, other = (trajectory.position[k, disk] for disk in (pairs.i, pairs.other))
-    for wall in np.unique(pairs.j[pairs.j < 0]):
-        at = pairs.j == wall
-        other[at] = laws.nearest_on_segment(x[at], *scene.walls[-1 - wall])
-    return laws.nearer_way(x - other, scene)
+    def separation(self, pairs: Pairs, k: np.ndarray) -> Array:
+        """(m, 2) m, from the second of each pair to the first."""
+        x, other = np.moveaxis(self.trajectory.position[k[:, None], pairs.disks], 1, 0)
+        for wall in np.unique(pairs.j[pairs.j < 0]):
+            at = pairs.j == wall
+            other[at] = laws.nearest_on_segment(x[at], *self.scene.walls[-1 - wall])
+        return laws.nearer_way(x - other, self.scene)
 
+    def velocities(self, pairs: Pairs, k: np.ndarray, fall: Array) -> Array:
+        """(m, 2, 2) m/s of both sides of each pair, carried by `fall` (m, 2, 2) m/s2 from sample k
+        to the time of their collision; 0 for a wall."""
+        v: Array = self.trajectory.velocity[k[:, None], pairs.disks]
+        v[pairs.j < 0, 1] = 0.0
+        carried: Array = v + fall * (pairs.when - self.trajectory.t[k])[:, None, None]
+        return carried
 
-def approach(
-    trajectory: Trajectory, scene: Scene, pairs: Pairs, k: np.ndarray, rounding: float
-) -> np.ndarray:
-    """(m,) whether the two of each pair still approach in sample k, (m,), by more than `FLOOR`
-    roundings."""
-    way = separation(trajectory, scene, pairs, k)
-    v = velocities(trajectory, pairs, k, falling(scene, pairs))
-    floor = FLOOR * rounding * laws.lengths(v).sum(axis=1)
-    nearing: np.ndarray = np.vecdot(way, v[:, 0] - v[:, 1]) < -floor * laws.lengths(way)
-    return nearing
+    def falling(self, pairs: Pairs) -> Array:
+        """(m, 2, 2) m/s2, the acceleration by gravity of both sides of each pair."""
+        return np.where(pairs.moves(self.scene)[..., None], self.scene.gravity, 0.0)
 
+    def acceleration(self, pairs: Pairs, k: np.ndarray) -> Array:
+        """(m, 2, 2) m/s2 of both sides of each pair between sample k and the next: gravity, or what
+        the samples say of a disk that gains less than `FREE` of it and has no collision there."""
+        fall, inside = self.falling(pairs), (k >= 0) & (k + 1 < len(self.trajectory))
+        k, disks = np.where(inside, k, 0)[:, None], pairs.disks
+        change = self.trajectory.velocity[k + 1, disks] - self.trajectory.velocity[k, disks]
+        gained = change / interval(self.trajectory)
+        lies = inside[:, None] & (laws.lengths(gained) < FREE * laws.lengths(fall))
+        lies &= self.count[k + 1, disks] == 0
+        return np.where(lies[..., None], gained, fall)
 
-def velocities(trajectory: Trajectory, pairs: Pairs, k: np.ndarray, fall: Array) -> Array:
-    """(m, 2, 2) m/s of both sides of each pair, carried by `fall` (m, 2, 2) m/s2 from sample k,
-    (m,), to the time of their collision; 0 for a wall."""
-    disks = np.stack([pairs.i, pairs.other], axis=1)
-    v: Array = trajectory.velocity[k[:, None], disks]
-    v[pairs.j < 0, 1] = 0.0
-    carried: Array = v + fall * (pairs.when - trajectory.t[k])[:, None, None]
-    return carried
-
-
-def acceleration(
-    trajectory: Trajectory, scene: Scene, pairs: Pairs, k: np.ndarray, count: np.ndarray
-) -> Array:
-    """(m, 2, 2) m/s2 of both sides of each pair between sample k, (m,), and the next: gravity, or
-    what the samples say of a disk that gains less than `FREE` of it and has no collision there."""
-    fall, inside = falling(scene, pairs), (k >= 0) & (k + 1 < len(trajectory))
-    k = np.where(inside, k, 0)
-    for side, disk in enumerate((pairs.i, pairs.other)):
-        change = trajectory.velocity[k + 1, disk] - trajectory.velocity[k, disk]
-        gained = change / interval(trajectory)
-        lies = inside & (laws.lengths(gained) < FREE * laws.lengths(fall[:, side]))
-        lies &= count[k + 1, disk] == 0
-        fall[lies, side] = gained[lies]
-    return fall
-
-
-def falling(scene: Scene, pairs: Pairs) -> Array:
-    """(m, 2, 2) m/s2, the acceleration by gravity of both sides of each pair."""
-    moving = np.stack([~scene.static[pairs.i], second_moves(scene, pairs)], axis=1)
-    return np.where(moving[..., None], scene.gravity, 0.0)
-
-
-def is_rounding(trajectory: Trajectory, scene: Scene, read: Pairs, rounding: float) -> np.ndarray:
-    """(m,) whether the change of velocity of a moving disk, or of the relative velocity, is below
-    the floor."""
-    fall = falling(scene, read)
-    earlier, later = (velocities(trajectory, read, k, fall) for k in (read.k, read.k + 1))
-    moving = np.stack([np.ones(len(read.k), bool), second_moves(scene, read)], axis=1)
-    change = np.where(moving[..., None], later - earlier, 0.0)
-    speed = np.where(moving, laws.lengths(earlier) + laws.lengths(later), 0.0)
-    floor, between = FLOOR * rounding, laws.lengths(change[:, 0] - change[:, 1])
-    alone = (moving & (laws.lengths(change) <= floor * speed)).any(axis=1)
-    below: np.ndarray = alone | (between <= floor * speed.sum(axis=1))
-    return below
-
-
-def second_moves(scene: Scene, pairs: Pairs) -> np.ndarray:
-    """(m,) whether the second of each pair is a disk that moves."""
-    moving: np.ndarray = (pairs.j >= 0) & ~scene.static[pairs.other]
-    return moving
+    def is_rounding(self, pairs: Pairs) -> np.ndarray:
+        """(m,) whether the change of velocity of a moving disk, or of the relative velocity, is
+        below the floor."""
+        fall, moves = self.falling(pairs), pairs.moves(self.scene)
+        earlier, later = (self.velocities(pairs, k, fall) for k in (pairs.k, pairs.k + 1))
+        change = np.where(moves[..., None], later - earlier, 0.0)
+        speed = np.where(moves, laws.lengths(earlier) + laws.lengths(later), 0.0)
+        floor, between = FLOOR * self.rounding, laws.lengths(change[:, 0] - change[:, 1])
+        alone = (moves & (laws.lengths(change) <= floor * speed)).any(axis=1)
+        below: np.ndarray = alone | (between <= floor * speed.sum(axis=1))
+        return below
 
 
 def speeds_along_normal(
@@ -294,15 +260,13 @@ def speeds_along_normal(
     so that the spins tell the angle; a wall's normal is known. The speeds are nan if the change is
     not that of one collision.
     """
-    both, wall = second_moves(scene, pairs), pairs.j < 0
-    disks = np.stack([pairs.i, pairs.other], axis=1)
-    moves = np.stack([~wall | wall, both], axis=1)
+    moves, wall, disks = pairs.moves(scene), pairs.j < 0, pairs.disks
     change = np.where(moves[..., None], later - earlier, 0.0)
     turned = np.where(moves, turned, 0.0)
     slid = (np.abs(turned) * scene.radius[disks] > CLEAN * laws.lengths(change)).any(axis=1)
     kicks = laws.moving_mass(scene)[disks][..., None] * change
     size, strongest = laws.lengths(kicks[:, 0]), laws.lengths(kicks).max(axis=1)
-    strange = both & (laws.lengths(kicks.sum(axis=1)) > CLEAN * strongest)
+    strange = moves[:, 1] & (laws.lengths(kicks.sum(axis=1)) > CLEAN * strongest)
     rubs = -turned * laws.moving_inertia(scene)[disks] / scene.radius[disks]
     rub = np.where(rubs[:, 0] == 0.0, rubs[:, 1], rubs[:, 0])
     strange |= slid & (np.abs(rub) >= size)

@@ -47,12 +47,9 @@ LASTS = 3  # samples in a row
 
 
 class Kind(NamedTuple):
-    """What a verdict is about: the unit of its value, what the value is, and what is said of a run
-    that fails it; in `said` {0} is the value, {1} the value in percent."""
-
     unit: str
-    means: str
-    said: str
+    means: str  # what the value is
+    said: str  # of a run that fails; {0} is the value, {1} the value in percent
 
 
 VERDICTS = {
@@ -74,22 +71,14 @@ VERDICTS = {
 
 @dataclass(frozen=True)
 class Verdict:
-    """A number of a whole run; it fails above `bound`, or if it is not a number.
+    """A number of a whole run; it fails above `bound`, or if it is not a number."""
 
-    Attributes:
-        id: a key of `VERDICTS`, which has the unit.
-        value, bound: in that unit.
-        at: s, the first sample that fails, else that of the value; nan: the whole run.
-        disks: those concerned, a wall w as -1 - w; (): all.
-        event: what happens, where that is more than the words of `VERDICTS`.
-    """
-
-    id: str
+    id: str  # a key of `VERDICTS`, which has the unit of value and bound
     value: float
     bound: float
-    at: float = np.nan
-    disks: tuple[int, ...] = ()
-    event: str = ""
+    at: float = np.nan  # s, the first sample that fails, else that of the value; nan: the whole run
+    disks: tuple[int, ...] = ()  # those concerned, a wall w as -1 - w; (): all
+    event: str = ""  # what happens, where that is more than the words of `VERDICTS`
 
     @property
     def failed(self) -> bool:
@@ -111,17 +100,13 @@ def verdicts(
     rounding: float = FLOAT64,
     truth: Trajectory | None = None,
 ) -> list[Verdict]:
-    """Every verdict that applies to a run with steps of `dt` s, in the order of `VERDICTS`.
-
-    Args:
-        rounding: relative, of the numbers that the engine keeps.
-        truth: the exact answer up to its horizon, if there is one.
-    """
+    """Every verdict that applies to a run with steps of `dt` s, in the order of `VERDICTS`;
+    `rounding`: relative, of the engine's numbers; `truth`: the exact answer up to its horizon."""
     if len(played) < LASTS:
         return []
-    judge = Judge(scenario, played, dt, rounding, truth)
     # a disk thrown far out gives inf or nan
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        judge = Judge(scenario, played, dt, rounding, truth)
         return [*judge.contacts(), *judge.energy(), *judge.flight(), *judge.rest()]
 
 
@@ -148,55 +133,37 @@ def in_words(kind: str, value: float) -> str:
 
 
 class Pair(NamedTuple):
-    """A disk beside m others, or beside one wall w, -1 - w: their numbers (m,); their overlap
-    (k, m) in m; the way between their centres (k, m, 2) m; the radius (m,) of the smaller disk."""
-
     disk: int
-    others: NDArray[np.int64]
-    overlap: Array
-    way: Array
-    smaller: Array
+    others: NDArray[np.int64]  # (m,), or one wall w, -1 - w
+    overlap: Array  # (k, m) m
+    way: Array  # (k, m, 2) m, between their centres
+    smaller: Array  # (m,) m, the radius of the smaller disk
 
 
-@dataclass(frozen=True, eq=False)
 class Judge:
-    scenario: Scenario
-    played: Trajectory
-    dt: float
-    rounding: float
-    truth: Trajectory | None
-
-    @cached_property
-    def interval(self) -> float:
-        """s between two samples."""
-        return float(self.played.t[1] - self.played.t[0])
-
-    @cached_property
-    def g(self) -> float:
-        """m/s2."""
-        return float(np.hypot(*self.scenario.scene.gravity))
-
-    @cached_property
-    def speed(self) -> Array:
-        """(k,) m/s, the largest of any disk at the sample before, at and after."""
-        speed: Array = laws.lengths(self.played.velocity).max(axis=1)
+    def __init__(
+        self,
+        scenario: Scenario,
+        played: Trajectory,
+        dt: float,
+        rounding: float,
+        truth: Trajectory | None,
+    ) -> None:
+        self.scenario, self.played, self.dt = scenario, played, dt
+        self.rounding, self.truth = rounding, truth
+        self.interval = float(played.t[1] - played.t[0])  # s between two samples
+        self.g = float(np.hypot(*scenario.scene.gravity))  # m/s2
+        way, wrap = np.diff(played.position, axis=0), scenario.scene.wrap
+        # (k,) m/s, the largest of any disk at the sample before, at and after
+        speed: Array = laws.lengths(played.velocity).max(axis=1)
         speed = np.maximum.reduce([speed, np.append(speed[1:], 0.0), np.append(0.0, speed[:-1])])
-        return speed
-
-    @cached_property
-    def reach(self) -> Array:
-        """(k,) m: gaps above it cannot have closed between the samples beside."""
-        moved = laws.lengths(np.diff(self.played.position, axis=0)).max(axis=1)
-        moved = np.maximum(moved, self.speed[1:] * self.interval)
-        both: Array = 2 * np.maximum(np.append(moved, moved[-1]), np.append(moved[0], moved))
-        return both
-
-    @cached_property
-    def jumps(self) -> NDArray[np.bool_]:
-        """(k - 1, n), where a disk is set onto the opposite edge."""
-        wrap, moved = self.scenario.scene.wrap, np.abs(np.diff(self.played.position, axis=0))
+        self.speed = speed
+        # (k,) m: gaps above it cannot have closed between the samples beside
+        moved = np.maximum(laws.lengths(way).max(axis=1), speed[1:] * self.interval)
+        self.reach = 2 * np.maximum(np.append(moved, moved[-1]), np.append(moved[0], moved))
+        # (k - 1, n), where a disk is set onto the opposite edge
         half = np.array([np.inf, np.inf]) if wrap is None else (wrap[1] - wrap[0]) / 2
-        return np.asarray((moved > half).any(axis=2))
+        self.jumps = np.asarray((np.abs(way) > half).any(axis=2))
 
     @cached_property
     def pairs(self) -> list[Pair]:

@@ -42,12 +42,9 @@ NOT_JUDGED = "not judged"
 
 
 class Value(NamedTuple):
-    """A number and where it comes from: the disk (-1: all), the instant in s, a remark; and whether
-    it is judged."""
-
     value: float
-    disk: int = -1
-    at: float = np.nan
+    disk: int = -1  # -1: all
+    at: float = np.nan  # s
     note: str = ""
     judged: bool = True
 
@@ -60,25 +57,15 @@ def not_judged(reason: str) -> Value:
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """The trajectory of a run and the one it is measured against, over their common samples.
-
-    Attributes:
-        scenario: the scenario played.
-        dt: s, of the engine.
-        played: the engine's trajectory, cut to the common samples.
-        other: the truth, another engine's trajectory, or None: only the laws of physics.
-        jumps: the jumps of `other` (delays.py) if it is the truth; None for an engine.
-        rounding: the relative rounding of the numbers that the engine keeps.
-        silent: whether one of the two reports no collisions, so that they cannot be compared.
-    """
+    """The trajectory of a run and the one it is measured against, over their common samples."""
 
     scenario: Scenario
-    dt: float
+    dt: float  # s, of the engine
     played: Trajectory
-    other: Trajectory | None = None
-    jumps: Jumps | None = None
-    rounding: float = FLOAT64
-    silent: bool = False
+    other: Trajectory | None = None  # the truth, another engine's, or None: only the laws
+    jumps: Jumps | None = None  # of `other` (delays.py) if it is the truth
+    rounding: float = FLOAT64  # relative, of the numbers that the engine keeps
+    silent: bool = False  # whether one of the two reports no collisions
 
     @property
     def scene(self) -> Scene:

@@ -19,49 +19,26 @@ WAIT = 6
 NEVER = 2**31  # a frame that no flight has
 
 
-class FirstCollision(NamedTuple):
-    """The first collision of a disk in a frame: its time, s on the flight's clock, its frame, its
-    disks (wall w as -1 - w), and where the two touched, (x, y) m."""
+class Event(NamedTuple):
+    """What happened in a frame at (x, y) m.
 
-    t: float
-    frame: int
-    i: int
-    j: int
-    x: float
-    y: float
-
-    @property
-    def pair(self) -> frozenset[int]:
-        return frozenset((self.i, self.j))
-
-    @property
-    def disks(self) -> set[int]:
-        return {disk for disk in (self.i, self.j) if disk >= 0}
-
-
-class Edge(NamedTuple):
-    """Where a ship left the field: frame, and where it was last seen inside, (x, y) m."""
+    disks: the two that collided for the first time in that frame (wall w as -1 - w); the one whose
+    velocity came to differ without a collision; or none: the ship left the field, and was seen
+    there last. t: s on the flight's clock, of a collision.
+    """
 
     frame: int
     x: float
     y: float
-
-
-class Drift(NamedTuple):
-    """A disk whose velocity came to differ without a collision: frame, disk, where it is then,
-    (x, y) m."""
-
-    frame: int
-    disk: int
-    x: float
-    y: float
+    disks: tuple[int, ...] = ()
+    t: float = 0.0
 
 
 class Divergence(NamedTuple):
     """Where a ghost diverged from the engine that was solid then, and what happened there; `only`:
     the engine in which alone it happened, "" in both."""
 
-    at: FirstCollision | Edge | Drift
+    at: Event
     solid: str
     only: str
 
@@ -78,7 +55,7 @@ class Touches:
     def __init__(self, scene: Scene, dt: float, weight: float) -> None:
         self.radius, self.dt, self.weight, self.count = scene.radius, dt, weight, 0
         self.since = 0.0  # s on the flight's clock from which the engine counts its steps
-        self.recent: list[FirstCollision] = []
+        self.recent: list[Event] = []
         # by pair: step of the latest impulse, and size of the strongest
         self.step: dict[tuple[int, int], int] = {}
         self.strongest: dict[tuple[int, int], float] = {}
@@ -102,8 +79,9 @@ class Touches:
                 # of a wall, only the disk's centre is known here
                 share = self.radius[i] / (self.radius[i] + self.radius[j]) if j >= 0 else 0.0
                 place = position[i] + share * (position[max(j, 0)] - position[i])
-                self.recent.append(FirstCollision(t, frame, i, j, *place.tolist()))
-                struck |= self.recent[-1].disks
+                x, y = place.tolist()
+                self.recent.append(Event(frame, x, y, (i, j), t))
+                struck |= {i, j}
 
     def begins(self, collision: ContactImpulse) -> bool:
         """Whether an impulse is a collision of its own, as `first_collisions` counts
@@ -137,20 +115,24 @@ def differing_since(since: Array, velocity: Array, other: Array, frame: int) -> 
 
 def cause_of(
     since: Array, solid: Touches, ghost: Touches, state: State, frame: int
-) -> tuple[FirstCollision | Drift, bool, bool] | None:
+) -> tuple[Event, bool, bool] | None:
     """What made a disk differ that has done so for `WAIT` frames by the end of frame `frame`, and
     whether it happened in the solid engine and in the ghost; None if no disk has. `state`: the
     ghost's."""
-    first = since.min()
+    first = int(since.min())
     if frame - first + 1 < WAIT:
         return None
     disks = set(np.flatnonzero(since == first).tolist())
     touches = [touch for touch in (*solid.recent, *ghost.recent) if touch.frame == first]
-    touches = [touch for touch in touches if touch.disks & disks]
+    touches = [touch for touch in touches if disks & set(touch.disks)]
     if not touches:
         disk = min(disks)
-        return Drift(int(first), disk, *state.position[disk].tolist()), True, True
+        x, y = state.position[disk].tolist()
+        return Event(first, x, y, (disk,)), True, True
     # both its disks, if others of them met a right one in the same frame
-    at = min(touches, key=lambda touch: (not touch.disks <= disks, touch.t))
-    happened = [any(touch.pair == at.pair for touch in noted.recent) for noted in (solid, ghost)]
+    at = min(
+        touches, key=lambda touch: (any(k >= 0 and k not in disks for k in touch.disks), touch.t)
+    )
+    pair = set(at.disks)
+    happened = [any(set(x.disks) == pair for x in noted.recent) for noted in (solid, ghost)]
     return at, happened[0], happened[1]

@@ -1,21 +1,15 @@
 "use strict";
-// Draws the field: stars, earth, asteroids and the ship of the solid engine, the ghosts as outlines in their colours.
+// Draws the field: earth, asteroids and the ship of the solid engine, the ghosts as outlines in their colours.
 
 const looks = JSON.parse(document.getElementById("looks").textContent);
 const reducedMotion = matchMedia("(prefers-reduced-motion: reduce)");
 const SHIP = 0;
 const EDGE = 6;  // pixels between a label and the edge of the field
-
-// The same sky and the same rocks on every visit (a linear congruential generator; Numerical Recipes, 7.1).
-function random(seed) {
-  let state = seed >>> 0;
-  return () => { state = (Math.imul(state, 1664525) + 1013904223) >>> 0; return state / 4294967296; };
-}
+const RIM = "rgb(230 235 245 / .35)", THRUST = "#ffc46b", TEXT = "#f2f4f8";
 
 class Field {
   constructor(canvas) {
     this.canvas = canvas;
-    this.sky = document.createElement("canvas");
     this.field = null;
     new ResizeObserver(() => this.fit()).observe(canvas);
   }
@@ -25,7 +19,6 @@ class Field {
     const [left, bottom, right, top] = field.wrap ?? this.around(field);
     this.view = { left, bottom, right, top };
     this.canvas.closest(".cockpit").style.setProperty("--ratio", (right - left) / (top - bottom));
-    this.rocks = field.radius.map((_, disk) => this.rock(disk));
     this.fit();
   }
 
@@ -45,90 +38,22 @@ class Field {
     if (!width || !this.field) return;
     const sharp = window.devicePixelRatio || 1;
     Object.assign(this.canvas, { width: Math.round(width * sharp), height: Math.round(height * sharp) });
-    Object.assign(this.sky, { width: this.canvas.width, height: this.canvas.height });
     this.size = [width, height, sharp];
     this.scale = width / (this.view.right - this.view.left);
-    this.paintSky();
     if (this.last) this.draw(...this.last);
   }
 
   pixel(x, y) { return [(x - this.view.left) * this.scale, (this.view.top - y) * this.scale]; }
 
-  paintSky() {
-    const [width, height, sharp] = this.size;
-    const pen = this.sky.getContext("2d");
-    pen.setTransform(sharp, 0, 0, sharp, 0, 0);
-    const dusk = pen.createLinearGradient(0, 0, width, height);
-    dusk.addColorStop(0, "#0b1020");
-    dusk.addColorStop(0.6, "#111a33");
-    dusk.addColorStop(1, "#1b1f3f");
-    pen.fillStyle = dusk;
-    pen.fillRect(0, 0, width, height);
-    const next = random(7);
-    for (let k = 0; k < width / 3; k++) {
-      pen.globalAlpha = 0.15 + 0.6 * next() ** 3;
-      pen.fillStyle = next() < 0.15 ? "#ffdcae" : "#dfe8ff";
-      pen.beginPath();
-      pen.arc(next() * width, next() * height, 0.4 + 1.1 * next() ** 4, 0, 2 * Math.PI);
-      pen.fill();
-    }
-    pen.globalAlpha = 1;
-    if (this.field.earth) this.paintEarth(pen);
-    pen.strokeStyle = "#8b959e";
-    pen.lineWidth = 2;
-    for (const [x0, y0, x1, y1] of this.field.walls) {
-      pen.beginPath();
-      pen.moveTo(...this.pixel(x0, y0));
-      pen.lineTo(...this.pixel(x1, y1));
-      pen.stroke();
-    }
-  }
-
-  paintEarth(pen) {
-    const [ex, ey, size] = this.field.earth;
-    const [x, y] = this.pixel(ex, ey), r = size * this.scale;
-    const air = pen.createRadialGradient(x, y, r * 0.9, x, y, r * 1.35);
-    air.addColorStop(0, "rgb(120 180 255 / .45)");
-    air.addColorStop(1, "rgb(120 180 255 / 0)");
-    pen.fillStyle = air;
-    pen.beginPath(); pen.arc(x, y, r * 1.35, 0, 2 * Math.PI); pen.fill();
-    pen.save();
-    pen.beginPath(); pen.arc(x, y, r, 0, 2 * Math.PI); pen.clip();
-    const sea = pen.createRadialGradient(x - r * 0.4, y - r * 0.4, r * 0.1, x, y, r * 1.2);
-    sea.addColorStop(0, "#5db2ff");
-    sea.addColorStop(0.6, "#1e5fae");
-    sea.addColorStop(1, "#0a2350");
-    pen.fillStyle = sea;
-    pen.fillRect(x - r, y - r, 2 * r, 2 * r);
-    pen.fillStyle = "rgb(92 150 84 / .9)";
-    for (const [dx, dy, a, b, turn] of [[-0.35, -0.3, 0.42, 0.26, 0.5], [0.1, 0.35, 0.24, 0.4, 0.3], [0.55, -0.15, 0.26, 0.36, -0.4]]) {
-      pen.beginPath(); pen.ellipse(x + dx * r, y + dy * r, a * r, b * r, turn, 0, 2 * Math.PI); pen.fill();
-    }
-    pen.fillStyle = "rgb(255 255 255 / .55)";
-    for (const [dx, dy, a] of [[0.1, -0.75, 0.5], [-0.3, 0.1, 0.42], [0.35, 0.62, 0.4]]) {
-      pen.beginPath(); pen.ellipse(x + dx * r, y + dy * r, a * r, 0.07 * r, -0.15, 0, 2 * Math.PI); pen.fill();
-    }
-    pen.restore();
-  }
-
-  // An outline within the disk, and craters, in units of the radius.
-  rock(disk) {
-    const next = random(disk * 7919 + 13);
-    const outline = Array.from({ length: 11 }, (_, k) => [(k / 11) * 2 * Math.PI, 0.84 + 0.16 * next()]);
-    const craters = Array.from({ length: 3 }, () => [0.55 * (2 * next() - 1), 0.55 * (2 * next() - 1), 0.1 + 0.13 * next()]);
-    const grey = Math.round(112 + 46 * next());
-    return { outline, craters, colour: `rgb(${grey + 10} ${grey} ${grey - 10})`, dark: `rgb(${grey - 34} ${grey - 42} ${grey - 50})` };
-  }
-
   // `flyers`: [{name, label, at: [[x, y, angle], ...], gone}], of which number `solid` is the solid one; `marks`: where one diverged.
   draw(flyers, solid, force, marks) {
     this.last = [flyers, solid, force, marks];
-    const pen = this.canvas.getContext("2d");
-    pen.setTransform(1, 0, 0, 1, 0, 0);
-    pen.drawImage(this.sky, 0, 0);
+    const pen = this.canvas.getContext("2d"), leader = flyers[solid];
     pen.setTransform(this.size[2], 0, 0, this.size[2], 0, 0);
-    const leader = flyers[solid];
-    leader.at.forEach(([x, y, angle], disk) => disk !== SHIP && this.drawRock(pen, disk, x, y, angle));
+    pen.clearRect(0, 0, ...this.size);
+    if (this.field.earth) this.drawEarth(pen, ...this.field.earth);
+    this.drawWalls(pen);
+    leader.at.forEach((place, disk) => disk === SHIP || this.drawRock(pen, disk, ...place));
     this.drawShip(pen, ...leader.at[SHIP], force);
     flyers.forEach((flyer, k) => k !== solid && !flyer.gone && this.drawGhost(pen, flyer, leader));
     const taken = [this.drawName(pen, leader)];
@@ -136,52 +61,52 @@ class Field {
     marks.forEach((mark) => taken.push(this.drawLabel(pen, mark, taken)));
   }
 
-  within(pen, x, y, angle, paint) { this.withinPixels(pen, ...this.pixel(x, y), -angle, paint); }
+  drawEarth(pen, x, y, size) {
+    this.within(pen, x, y, 0, () => {
+      const r = size * this.scale, sea = pen.createRadialGradient(-0.4 * r, -0.4 * r, 0.1 * r, 0, 0, 1.2 * r);
+      sea.addColorStop(0, "#5db2ff");
+      sea.addColorStop(0.6, "#1e5fae");
+      sea.addColorStop(1, "#0a2350");
+      pen.fillStyle = sea;
+      pen.strokeStyle = "rgb(120 180 255 / .25)";
+      pen.lineWidth = 0.2 * r;
+      circle(pen, r).fill();
+      circle(pen, 1.1 * r).stroke();
+    });
+  }
+
+  drawWalls(pen) {
+    pen.strokeStyle = "#8b959e";
+    pen.lineWidth = 2;
+    for (const [x0, y0, x1, y1] of this.field.walls) line(pen, this.pixel(x0, y0), this.pixel(x1, y1)).stroke();
+  }
 
   drawRock(pen, disk, x, y, angle) {
-    const r = this.field.radius[disk] * this.scale, rock = this.rocks[disk];
+    const r = this.field.radius[disk] * this.scale;
     this.within(pen, x, y, angle, () => {
-      pen.beginPath();
-      rock.outline.forEach(([turn, far], k) => pen[k ? "lineTo" : "moveTo"](far * r * Math.cos(turn), far * r * Math.sin(turn)));
-      pen.closePath();
-      pen.fillStyle = rock.colour;
-      pen.fill();
-      pen.fillStyle = rock.dark;
-      for (const [cx, cy, size] of rock.craters) { pen.beginPath(); pen.arc(cx * r, cy * r, size * r, 0, 2 * Math.PI); pen.fill(); }
-      pen.strokeStyle = "rgb(230 235 245 / .35)";  // the disk that collides
+      pen.fillStyle = ["#86807a", "#97918b", "#76706a"][disk % 3];
+      pen.strokeStyle = RIM;
       pen.lineWidth = 1;
-      pen.beginPath(); pen.arc(0, 0, r, 0, 2 * Math.PI); pen.stroke();
-      pen.beginPath(); pen.moveTo(0.55 * r, 0); pen.lineTo(r, 0); pen.stroke();
+      circle(pen, r).fill();
+      pen.stroke();
+      line(pen, [0.55 * r, 0], [r, 0]).stroke();
     });
   }
 
   drawShip(pen, x, y, angle, [fx, fy, torque]) {
     const r = this.field.radius[SHIP] * this.scale;
     this.within(pen, x, y, angle, () => {
-      pen.strokeStyle = "rgb(230 235 245 / .35)";
+      pen.strokeStyle = RIM;
       pen.lineWidth = 1;
-      pen.beginPath(); pen.arc(0, 0, r, 0, 2 * Math.PI); pen.stroke();
-      pen.fillStyle = "#e9edf6";
-      pen.strokeStyle = "#9fb0cc";
-      pen.beginPath();
-      pen.moveTo(r, 0); pen.lineTo(-0.72 * r, 0.62 * r); pen.quadraticCurveTo(-0.35 * r, 0, -0.72 * r, -0.62 * r);
-      pen.closePath(); pen.fill(); pen.stroke();
-      pen.fillStyle = "#3f6fb5";
-      pen.beginPath(); pen.ellipse(0.2 * r, 0, 0.24 * r, 0.15 * r, 0, 0, 2 * Math.PI); pen.fill();
-      if (torque) {
-        pen.strokeStyle = "#ffc46b";
-        pen.lineWidth = 2.5;
-        pen.beginPath(); pen.arc(0, 0, 1.15 * r, torque > 0 ? -0.5 : -0.9, torque > 0 ? 0.9 : 0.5); pen.stroke();
-      }
+      circle(pen, r).stroke();
+      pen.fillStyle = TEXT;
+      arrow(pen, r).fill();
+      pen.strokeStyle = THRUST;
+      pen.lineWidth = 2.5;
+      if (torque) circle(pen, 1.15 * r, torque > 0 ? -0.5 : -0.9, torque > 0 ? 0.9 : 0.5).stroke();
     });
-    if (!fx && !fy) return;
-    this.within(pen, x, y, Math.atan2(fy, fx), () => {  // the flame: against the force, which need not be the heading
-      const flame = pen.createLinearGradient(-0.6 * r, 0, -1.7 * r, 0);
-      flame.addColorStop(0, "rgb(255 236 170 / .95)");
-      flame.addColorStop(1, "rgb(255 120 40 / 0)");
-      pen.fillStyle = flame;
-      pen.beginPath(); pen.moveTo(-0.5 * r, 0.24 * r); pen.lineTo(-1.75 * r, 0); pen.lineTo(-0.5 * r, -0.24 * r); pen.fill();
-    });
+    // the flame: against the force, which need not be the heading
+    if (fx || fy) this.within(pen, x, y, Math.atan2(fy, fx), () => { pen.fillStyle = THRUST; line(pen, [-0.6 * r, 0.24 * r], [-1.6 * r, 0], [-0.6 * r, -0.24 * r]).fill(); });
   }
 
   // Faint where it is still with the solid one, so that what has diverged stands out.
@@ -193,16 +118,11 @@ class Field {
       const r = this.field.radius[disk] * this.scale;
       this.within(pen, x, y, angle, () => {
         pen.lineWidth = disk === SHIP ? 2 : 1.3;
-        const apart = Math.hypot(x - leader.at[disk][0], y - leader.at[disk][1]) * this.scale;
-        pen.globalAlpha = apart > 1.5 ? 1 : 0.3;
-        pen.beginPath(); pen.arc(0, 0, r, 0, 2 * Math.PI); pen.stroke();
-        pen.beginPath();
-        if (disk === SHIP) { pen.moveTo(r, 0); pen.lineTo(-0.72 * r, 0.62 * r); pen.lineTo(-0.72 * r, -0.62 * r); pen.closePath(); }
-        else { pen.moveTo(0.55 * r, 0); pen.lineTo(r, 0); }
-        pen.stroke();
+        pen.globalAlpha = Math.hypot(x - leader.at[disk][0], y - leader.at[disk][1]) * this.scale > 1.5 ? 1 : 0.3;
+        circle(pen, r).stroke();
+        (disk === SHIP ? arrow(pen, r) : line(pen, [0.55 * r, 0], [r, 0])).stroke();
       });
     });
-    pen.globalAlpha = 1;
     pen.setLineDash([]);
   }
 
@@ -213,36 +133,33 @@ class Field {
     const [px, py] = this.pixel(x, y);
     const inside = earlier.filter((mark) => Math.hypot(...this.pixel(mark.x, mark.y).map((at, k) => at - [px, py][k])) < 12).length;
     const r = (this.large ? 13 : 8) + 4 * inside;
-    pen.strokeStyle = looks[name].dark;
-    pen.lineWidth = this.large ? 2 : 1.2;
-    pen.beginPath(); pen.arc(px, py, r, 0, 2 * Math.PI); pen.stroke();
-    for (const turn of [0, 1, 2, 3]) {
-      this.withinPixels(pen, px, py, (turn * Math.PI) / 2, () => { pen.beginPath(); pen.moveTo(r, 0); pen.lineTo(1.6 * r, 0); pen.stroke(); });
-    }
+    this.within(pen, x, y, 0, () => {
+      pen.strokeStyle = looks[name].dark;
+      pen.lineWidth = this.large ? 2 : 1.2;
+      circle(pen, r).stroke();
+      for (const [dx, dy] of [[1, 0], [0, 1], [-1, 0], [0, -1]]) line(pen, [r * dx, r * dy], [1.6 * r * dx, 1.6 * r * dy]).stroke();
+    });
   }
 
   // Beside its ring, below the labels that are there already; returns the box it takes: left, top, right, bottom in pixels.
   drawLabel(pen, { x, y, name, text }, taken) {
     const [px, py] = this.pixel(x, y);
-    const line = this.font(pen), width = pen.measureText(text).width, away = this.large ? 24 : 15;
+    const height = this.font(pen), width = pen.measureText(text).width, away = this.large ? 24 : 15;
     const left = px + away + width > this.size[0] - EDGE ? Math.max(EDGE, px - away - width) : Math.max(EDGE, px + away);
-    const box = (top) => [left, top, left + width, top + line];
+    const box = (top) => [left, top, left + width, top + height];
     const meets = (one) => taken.some((other) => one[0] < other[2] && other[0] < one[2] && one[1] < other[3] && other[1] < one[3]);
-    const lowest = this.size[1] - line - EDGE, first = Math.min(lowest, Math.max(EDGE, py - 1.2 * line));
-    const tops = Array.from({ length: 2 * Math.ceil(this.size[1] / line) }, (_, k) => first + (k % 2 ? -1 : 1) * Math.ceil(k / 2) * line);
-    const free = box(tops.find((top) => top >= EDGE && top <= lowest && !meets(box(top))) ?? first);
-    this.write(pen, text, free, looks[name].dark);
-    return free;
+    const lowest = this.size[1] - height - EDGE, first = Math.min(lowest, Math.max(EDGE, py - 1.2 * height));
+    const tops = Array.from({ length: 2 * Math.ceil(this.size[1] / height) }, (_, k) => first + (k % 2 ? -1 : 1) * Math.ceil(k / 2) * height);
+    return this.write(pen, text, box(tops.find((top) => top >= EDGE && top <= lowest && !meets(box(top))) ?? first), looks[name].dark);
   }
 
   // The solid one's name below its ship; returns the box it takes.
   drawName(pen, { label, at }) {
     const [px, py] = this.pixel(...at[SHIP]), r = this.field.radius[SHIP] * this.scale;
-    const line = this.font(pen), width = pen.measureText(label).width;
+    const height = this.font(pen), width = pen.measureText(label).width;
     const left = Math.min(Math.max(EDGE, px - width / 2), this.size[0] - width - EDGE);
-    const top = py + r + 3 + line > this.size[1] - EDGE ? py - r - 3 - line : py + r + 3;
-    this.write(pen, label, [left, top], "#f2f4f8");
-    return [left, top, left + width, top + line];
+    const top = py + r + 3 + height > this.size[1] - EDGE ? py - r - 3 - height : py + r + 3;
+    return this.write(pen, label, [left, top, left + width, top + height], TEXT);
   }
 
   // Height of a line of the field's letters in pixels.
@@ -251,20 +168,29 @@ class Field {
     return this.large ? 15 : 12;
   }
 
-  write(pen, text, [left, top], colour) {
+  write(pen, text, box, colour) {
     pen.textBaseline = "top";
     pen.lineWidth = 3;
     pen.strokeStyle = "rgb(8 12 26 / .85)";
-    pen.strokeText(text, left, top + 1);
+    pen.strokeText(text, box[0], box[1] + 1);
     pen.fillStyle = colour;
-    pen.fillText(text, left, top + 1);
+    pen.fillText(text, box[0], box[1] + 1);
+    return box;
   }
 
-  withinPixels(pen, x, y, turn, paint) {
+  // Paints in pixels about a place of the field, with y down; the pen is as before afterwards.
+  within(pen, x, y, angle, paint) {
     pen.save();
-    pen.translate(x, y);
-    pen.rotate(turn);
+    pen.translate(...this.pixel(x, y));
+    pen.rotate(-angle);
     paint();
     pen.restore();
   }
 }
+
+// Each begins a path of the pen, and returns the pen to stroke or to fill it.
+function circle(pen, r, from = 0, to = 2 * Math.PI) { pen.beginPath(); pen.arc(0, 0, r, from, to); return pen; }
+
+function line(pen, first, ...others) { pen.beginPath(); pen.moveTo(...first); others.forEach((place) => pen.lineTo(...place)); return pen; }
+
+function arrow(pen, r) { line(pen, [r, 0], [-0.72 * r, 0.62 * r], [-0.72 * r, -0.62 * r]).closePath(); return pen; }

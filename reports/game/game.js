@@ -174,11 +174,10 @@ class Game {
     return this.field.engines[flyers.slice(0, solid).findLastIndex((flyer) => flyer.left_at === since)];
   }
 
-  divergence({ t, i, j, disk, solid, only }, now) {
-    const from = solid === this.field.engines[now] ? "" : `, beside ${shortName(solid)}`;
-    const at = `${t.toFixed(2)} s: `;
-    if (disk !== undefined) return `${at}${bodyOf(disk)} gets another velocity without a collision${from}`;
+  divergence({ t, disks: [i, j], solid, only }, now) {
+    const from = solid === this.field.engines[now] ? "" : `, beside ${shortName(solid)}`, at = `${t.toFixed(2)} s: `;
     if (i === undefined) return `${at}the ship leaves the field in ${shortName(only)} only${from}`;
+    if (j === undefined) return `${at}${bodyOf(i)} gets another velocity without a collision${from}`;
     return `${at}${pairOf(i, j)} collide in ${only ? `${shortName(only)} only` : "both"}${from}`;
   }
 

@@ -23,7 +23,7 @@ from crosscheck2d.reports.game.divergence import DIVERGED, WAIT
 from crosscheck2d.reports.game.flight import FRAME, SUBSTEPS
 from crosscheck2d.reports.game.session import Session
 from crosscheck2d.reports.page.documents import render
-from crosscheck2d.reports.page.own_solvers import Said
+from crosscheck2d.reports.page.kit import Said
 from crosscheck2d.reports.page.server import MOST_TABS, NAMES, in_thread
 from crosscheck2d.reports.page.style import looks_of
 from crosscheck2d.scenarios.model import Scenario

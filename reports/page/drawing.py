@@ -7,7 +7,6 @@ import io
 import re
 from collections.abc import Sequence
 from functools import partial
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -20,7 +19,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-ENDS = 0.75  # of the width: labels of lines that all end right of it stand below each other
 INK, SOFT, RULE, PAPER = "#16191d", "#57626e", "#dfe3e0", "#fefefe"
 VARIABLES = {SOFT: "--soft", RULE: "--line", PAPER: "--page"}
 SETTINGS: Any = {
@@ -46,22 +44,12 @@ SETTINGS: Any = {
 
 
 class Line(NamedTuple):
-    """A line of a chart.
-
-    Attributes:
-        name: `engine:profile`, which has the look.
-        x, y: what is not finite is left out.
-        label: stands at an end of the line; "" for none.
-        filled: the point with a filled marker; -1 for none.
-        faint: drawn thin, without markers.
-    """
-
-    name: str
-    x: ArrayLike
+    name: str  # `engine:profile`, which has the look
+    x: ArrayLike  # what is not finite is left out
     y: ArrayLike
-    label: str = ""
-    filled: int = -1
-    faint: bool = False
+    label: str = ""  # in the legend; "" for none
+    filled: int = -1  # the point with a filled marker; -1 for none
+    faint: bool = False  # drawn thin, without markers
 
     @property
     def look(self) -> style.Look:
@@ -87,12 +75,11 @@ def draw_lines(
     x_unit: str = "",
     y_unit: str = "",
 ) -> None:
-    """Draw `lines` with their labels; `logarithmic`: "x", "y", "xy" or ""; the ticks of a
+    """Draw `lines` with a legend at the right; `logarithmic`: "x", "y", "xy" or ""; the ticks of a
     logarithmic axis in µs (`x_unit`, `y_unit`) are written as µs, ms and s."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-    for line in lines:
-        draw_line(axes, line)
+    drawn = [(line, draw_line(axes, line)) for line in lines]
     for letter, axis, unit in (("x", axes.xaxis, x_unit), ("y", axes.yaxis, y_unit)):
         if letter in logarithmic:
             axes.set(**{f"{letter}scale": "log"})
@@ -105,22 +92,36 @@ def draw_lines(
     axes.set_xlabel(x_title)
     if y_title:  # across the top: nobody turns the head
         axes.set_title(y_title, loc="left", fontsize=9, color=SOFT)
-    label_lines(axes, [line for line in lines if line.label])
+    named = [(line, artist) for line, artist in drawn if line.label and len(artist.get_ydata())]
+    if not named:
+        return
+    named.sort(key=lambda pair: pair[1].get_ydata()[-1], reverse=True)  # as the lines end
+    legend = axes.legend(
+        [artist for _, artist in named],
+        ["line"] * len(named),  # matplotlib leaves out a label that begins with _
+        loc="center left",
+        bbox_to_anchor=(1.0, 0.5),
+        frameon=False,
+        handlelength=1.3,
+        handletextpad=0.5,
+    )
+    for name, (line, _) in zip(legend.get_texts(), named):
+        name.set(text=line.label, color=line.look.light, fontweight="bold")
 
 
-def draw_line(axes: Axes, line: Line) -> None:
+def draw_line(axes: Axes, line: Line) -> Any:
     look = line.look
     x, y = (np.asarray(values, float) for values in (line.x, line.y))
     finite = np.isfinite(x) & np.isfinite(y)
     dash: Any = (0, look.dash) if look.dash else "-"
     common = {"color": look.light, "linestyle": dash, "gid": line.name}
     if line.faint:
-        axes.plot(x[finite], y[finite], linewidth=0.8, alpha=0.4, **common)
-        return
+        return axes.plot(x[finite], y[finite], linewidth=0.8, alpha=0.4, **common)[0]
     face = look.light if look.filled and line.filled < 0 else PAPER
-    axes.plot(x[finite], y[finite], marker=marker(look), markerfacecolor=face, **common)
+    [drawn] = axes.plot(x[finite], y[finite], marker=marker(look), markerfacecolor=face, **common)
     filled = [k for k in (line.filled,) if 0 <= k < len(x) and finite[k]]
     axes.plot(x[filled], y[filled], marker=marker(look), color=look.light, linestyle="")
+    return drawn
 
 
 def marker(look: style.Look) -> Any:
@@ -144,88 +145,6 @@ def format_time(value: float) -> str:
     units = ((1e6, "s"), (1e3, "ms"), (1.0, "µs"))
     size, unit = next((unit for unit in units if value >= 0.9 * unit[0]), units[-1])
     return f"{style.number(value / size, 2)} {unit}"
-
-
-def label_lines(axes: Axes, lines: Sequence[Line]) -> None:
-    """Write each label at an end of its line, where it covers least.
-
-    Where all lines end at the right, the labels stand below each other there, with a thin line from
-    each end.
-    """
-    ends = []  # the points of each line that are drawn
-    for line in lines:
-        points = np.column_stack([np.asarray(line.x, float), np.asarray(line.y, float)])
-        ends.append(points[np.isfinite(points).all(axis=1)])
-    lines = [line for line, end in zip(lines, ends) if len(end)]
-    ends = [end for end in ends if len(end)]
-    if not lines:
-        return
-    figure: Any = axes.figure
-    axes.autoscale_view()
-    figure.draw_without_rendering()  # settles the layout, in which labels then find their places
-    figure.set_layout_engine("none")
-    height = 11.0 * figure.dpi / 72
-    longest = 0.58 * height * max(len(line.label) for line in lines)
-    left, bottom, width, tall = axes.get_position().bounds
-    to_pixels = axes.transData.transform
-    right = min(axes.transAxes.inverted().transform(to_pixels(end[-1]))[0] for end in ends)
-    stacked = len(lines) > 1 and right > ENDS
-    room = (longest + 30 if stacked else 0.5 * longest) / figure.bbox.width
-    axes.set_position((left, bottom, width - room, tall))
-    to_pixels = axes.transData.transform
-    if stacked:
-        order = sorted(range(len(lines)), key=lambda k: ends[k][-1][1])
-        heights = [to_pixels(ends[k][-1])[1] for k in order]
-        for k in range(1, len(heights)):
-            heights[k] = max(heights[k], heights[k - 1] + 1.1 * height)
-        for k, y in zip(order, heights):
-            x = axes.bbox.x1 + 8 - to_pixels(ends[k][-1])[0]
-            write_label(axes, lines[k], ends[k][-1], (x, y - to_pixels(ends[k][-1])[1]), lead=True)
-        return
-    drawn = [to_pixels(end) for end in ends]
-    taken = np.vstack([dense(points) for points in drawn])
-    (left, bottom), (_, top) = to_pixels(list(zip(axes.get_xlim(), axes.get_ylim())))
-    for line, end, points in zip(lines, ends, drawn):
-        width = 0.55 * height * len(line.label)
-        beside = ((9, -4), (9, 5), (9, -13), (-9 - width, -4), (-width / 2, 9), (-width / 2, -19))
-        choices: list[Any] = []
-        for (at_x, at_y), anchor in ((points[-1], end[-1]), (points[0], end[0])):
-            for dx, dy in beside:
-                x, y = at_x + dx, at_y + dy
-                covers = (
-                    (taken[:, 0] > x - 8)
-                    & (taken[:, 0] < x + width + 8)
-                    & (taken[:, 1] > y - 3)
-                    & (taken[:, 1] < y + height)
-                ).sum()
-                outside = (
-                    x < left or x + width > figure.bbox.width or y < bottom or y + height > top + 9
-                )
-                choices.append((covers + 99 * outside + 0.01 * len(choices), dx, dy, anchor, x, y))
-        _, dx, dy, anchor, x, y = min(choices, key=lambda choice: choice[0])
-        write_label(axes, line, anchor, (dx, dy))
-        box = [
-            (x + width * u, y + height * v) for u in np.linspace(0, 1, 9) for v in (0.1, 0.5, 0.9)
-        ]
-        taken = np.vstack([taken, box])
-
-
-def dense(points: Any) -> Any:
-    steps = np.linspace(0, 1, 12)[:, None]
-    return np.vstack([points, *(start + steps * (end - start) for start, end in pairwise(points))])
-
-
-def write_label(
-    axes: Axes, line: Line, end: Any, offset: tuple[float, float], lead: bool = False
-) -> None:
-    """The label of a line, this far from its end in pixels, in its colour."""
-    colour, points = line.look.light, 72 / axes.figure.dpi
-    arrow = {"arrowstyle": "-", "color": colour, "linewidth": 0.6, "shrinkA": 0, "shrinkB": 4}
-    axes.annotate(
-        line.label, end, (offset[0] * points, offset[1] * points), textcoords="offset points",
-        color=colour, weight="bold", va="center" if lead else "baseline",
-        arrowprops=arrow if lead else None, annotation_clip=False,
-    )  # fmt: skip
 
 
 def svg_of(figure: Figure, label: str, alone: bool = False) -> Markup:

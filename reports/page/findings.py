@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from crosscheck2d.adapters.conformance.laws import ALLOWED
 from crosscheck2d.adapters.conformance.probe import Departure
@@ -15,7 +16,7 @@ from crosscheck2d.reports.compare.comparison import Comparison
 from crosscheck2d.reports.compare.verdicts import in_words
 from crosscheck2d.reports.page.scenes import LOST, is_library
 from crosscheck2d.reports.page.style import number
-from crosscheck2d.reports.page.summary import Summary
+from crosscheck2d.reports.page.summary import Summary, median
 from crosscheck2d.reports.terminal.counts import counted, listed
 from crosscheck2d.scenarios.catalogue import SCENARIOS
 
@@ -109,11 +110,10 @@ def nearest(summary: Summary) -> str:
             "No scene here has an exact answer for a tenth of its samples, so no engine is scored."
             " The page shows what fails a verdict."
         )
-    medians = {}
-    for name in ranked(summary):
-        errors = [scene.error(name) for scene in scenes if name not in scene.frictionless]
-        errors = [error for error in errors if not np.isnan(error)]
-        medians[name] = float(np.median(errors)) if errors else np.nan
+    medians = {
+        name: median([s.error(name) for s in scenes if name not in s.frictionless])
+        for name in ranked(summary)
+    }
     if not medians:
         return (
             "No engine is ranked: none keeps the laws and plays a scene with an exact answer to its"
@@ -134,12 +134,12 @@ def nearest(summary: Summary) -> str:
 
 
 def own_sentence(name: str, summary: Summary) -> str:
-    errors = {s.name: s.error(name) for s in summary.scenes if s.counts}
-    errors = {scene: error for scene, error in errors.items() if not np.isnan(error)}
-    lost = sorted((s for s in errors if errors[s] > LOST), key=lambda s: -errors[s])
+    errors = pd.Series({s.name: s.error(name) for s in summary.scenes if s.counts}, dtype=float)
+    errors = errors.dropna()
+    lost = [*errors[errors > LOST].sort_values(ascending=False, kind="stable").index]
     refused = sum(name in scene.refused for scene in summary.scenes)
     file = name.removesuffix(OWN)
-    if not errors:  # the reason that nothing was played is printed beside it
+    if errors.empty:  # the reason that nothing was played is printed beside it
         return f"{file} is not ranked among the engines: it played no scene."
     near = f"{len(errors) - len(lost)} of {counted(len(errors), 'scene')}"
     sentence = f"{file} is within a radius of the exact answer in {near}"

@@ -6,39 +6,27 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.metadata import version
-from typing import Any, ClassVar
+from pathlib import Path
+from typing import Any, ClassVar, NamedTuple
 
 import pandas as pd
 from markupsafe import Markup
 
 from crosscheck2d.reports.page import style
 from crosscheck2d.reports.page.documents import ENGINE, deflated, environment, render
-from crosscheck2d.reports.page.links import Neighbour
 
 SCRIPTS = (*ENGINE, "page/kit.js")
 
 
 @dataclass(frozen=True)
 class TableCell:
-    """A cell of a table.
-
-    Attributes:
-        value: a number is formatted by `style.number`; text stands as it is.
-        title: what is shown where the mouse points at it.
-        link: an address; `#id` opens the row, the section or the fold of that id.
-        css: classes of kit.css: best, bad, soft, ...
-        side: small, at the right of the value.
-        notes: small, a line each, below the value.
-        span: columns that it covers.
-    """
-
-    value: Any = ""
-    title: str = ""
-    link: str = ""
-    css: str = ""
-    side: str = ""
-    notes: tuple[TableCell, ...] = ()
-    span: int = 1
+    value: Any = ""  # a number is formatted by `style.number`; text stands as it is
+    title: str = ""  # what is shown where the mouse points at it
+    link: str = ""  # an address; `#id` opens the row, the section or the fold of that id
+    css: str = ""  # classes of kit.css: best, bad, soft, ...
+    side: str = ""  # small, at the right of the value
+    notes: tuple[TableCell, ...] = ()  # small, a line each, below the value
+    span: int = 1  # columns that it covers
 
     @property
     def text(self) -> str | Markup:
@@ -52,28 +40,20 @@ def as_cell(value: Any) -> TableCell:
 @dataclass(frozen=True, eq=False)
 class Table:
     """A pandas frame as a table: its index is the heading of each row, its columns the headings;
-    both and what it holds may be `TableCell`.
-
-    Attributes:
-        groups: the title of the group of each row, aligned with the frame.
-        spans: (title, number of columns) above the columns.
-        opens: text of a row's heading -> the parts that its click, or the link `#text` (a blank is
-            `_` there), shows below the row; they are packed, and drawn when they are opened.
-        sortable: whether a heading sorts, and a field filters the rows.
-        css: classes of kit.css: main (fixed columns), map (small marks), stack (on a phone each
-            row is a block), text (cells break), plain.
-        corner: the heading of the column of row headings.
-        caption: a sentence below.
-    """
+    both and what it holds may be `TableCell`."""
 
     frame: pd.DataFrame
-    groups: Sequence[str | TableCell] = ()
-    spans: Sequence[tuple[str | TableCell, int]] = ()
+    groups: Sequence[str | TableCell] = ()  # the title of the group of each row
+    spans: Sequence[tuple[str | TableCell, int]] = ()  # (title, number of columns) above
+    # text of a row's heading -> the parts that its click, or the link `#text` (a blank is `_`
+    # there), shows below the row; they are packed, and drawn when they are opened
     opens: Mapping[str, Sequence[Part]] = field(default_factory=dict)
-    sortable: bool = False
+    sortable: bool = False  # whether a heading sorts, and a field filters the rows
+    # main (fixed columns), map (small marks), stack (on a phone each row is a block), text (cells
+    # break), plain
     css: str = ""
-    corner: str = ""
-    caption: str = ""
+    corner: str = ""  # the heading of the column of row headings
+    caption: str = ""  # a sentence below
     kind: ClassVar[str] = "table"
 
     @property
@@ -115,22 +95,14 @@ class Chart:
 
 @dataclass(frozen=True, eq=False)
 class Playback:
-    """Trajectories that play.
+    """Trajectories that play."""
 
-    Attributes:
-        pack: the packed layers, `replay.pack_layers`.
-        ratio: height over width of the view, `replay.ratio_of`.
-        label: what it shows, in words.
-        caption: a sentence below.
-        speeds, speed: those to choose from, and the first.
-    """
-
-    pack: str
-    ratio: float = 0.5
-    label: str = "Replay"
-    caption: str = ""
-    speeds: Sequence[float] = (0.1, 0.25, 0.5, 1, 2, 4)
-    speed: float = 1
+    pack: str  # `replay.pack_layers`
+    ratio: float = 0.5  # height over width of the view, `replay.ratio_of`
+    label: str = "Replay"  # what it shows, in words
+    caption: str = ""  # a sentence below
+    speeds: Sequence[float] = (0.1, 0.25, 0.5, 1, 2, 4)  # to choose from
+    speed: float = 1  # the first
     kind: ClassVar[str] = "replay"
 
 
@@ -153,49 +125,77 @@ class Code:
 
 @dataclass(frozen=True, eq=False)
 class Section:
-    """A title, a sentence, and parts; a section may be part of another, or of a row that opens.
-
-    Attributes:
-        folded: whether only the title is shown until it is clicked; the sentence stands beside it.
-        id: of the link `#id`.
-        css: `pair` puts it beside the next section that has it.
-    """
+    """A title, a sentence, and parts; a section may be part of another, or of a row that opens."""
 
     title: str = ""
     says: str | Markup = ""
     parts: Sequence[Part] = ()
-    folded: bool = False
-    id: str = ""
-    css: str = ""
+    folded: bool = False  # only title and sentence are shown until a click
+    id: str = ""  # of the link `#id`
+    css: str = ""  # `pair` puts it beside the next section that has it
     kind: ClassVar[str] = "section"
 
 
 Part = Table | Chart | Playback | Text | Code | Section
 
 
-@dataclass(frozen=True, eq=False)
-class Page:
-    """All of a page.
-
-    Attributes:
-        title: of the window and of the first heading.
-        sections: in reading order.
-        generator: the command that makes it; it marks the file as one that may be overwritten.
-        lead: what stands below the title, a paragraph each.
-        names: `engine:profile` of all that is drawn in replays.
-        looks: name -> how it is drawn, if not by `style.look`.
-        links: to other pages, `links.neighbours`.
-        footer: the last sentence; the default names the command.
-    """
+class Neighbour(NamedTuple):
+    """A page; `href`: in `PAGES` below the folder of all results, in a page relative to it, "" if
+    it does not exist."""
 
     title: str
-    sections: Sequence[Section]
-    generator: str
-    lead: Sequence[str | Markup] = ()
-    names: Sequence[str] = ()
-    looks: Mapping[str, style.Look] = field(default_factory=dict)
-    links: Sequence[Neighbour] = ()
-    footer: str = ""
+    says: str
+    command: str
+    href: str
+
+
+PAGES = {
+    "report": Neighbour(
+        "Report", "every scene, engine by engine", "crosscheck", "latest/report.html"
+    ),
+    "speed": Neighbour(
+        "Speed",
+        "the cost of an accuracy, and what each error is made of",
+        "crosscheck speed",
+        "speed/speed.html",
+    ),
+    "stability": Neighbour(
+        "Limits",
+        "the speed, density or distance at which an engine fails",
+        "crosscheck stability",
+        "stability/stability.html",
+    ),
+    "lessons": Neighbour(
+        "Lessons",
+        "why engines differ, with scenes that run",
+        "crosscheck lesson",
+        "lessons/index.html",
+    ),
+}
+
+
+def neighbours(page: Path, own: str) -> list[Neighbour]:
+    """The pages of `PAGES` besides `own`, as seen from the file `page`: each is looked for at its
+    default path, beside the folder of `page`."""
+    # a folder that is being written is beside its final place, so links found from it are right
+    beside = page.absolute().parent.parent
+    return [
+        page._replace(href=f"../{page.href}" if (beside / page.href).is_file() else "")
+        for key, page in PAGES.items()
+        if key != own
+    ]
+
+
+@dataclass(frozen=True, eq=False)
+class Page:
+    title: str  # of the window and of the first heading
+    sections: Sequence[Section]  # in reading order
+    generator: str  # the command that makes it; it marks the file as one that may be overwritten
+    lead: Sequence[str | Markup] = ()  # what stands below the title, a paragraph each
+    names: Sequence[str] = ()  # `engine:profile` of all that is drawn in replays
+    looks: Mapping[str, style.Look] = field(default_factory=dict)  # if not by `style.look`
+    links: Sequence[Neighbour] = ()  # to other pages, `neighbours`
+    footer: str = ""  # the last sentence; the default names the command
 
 
 def render_page(page: Page) -> str:
@@ -221,3 +221,18 @@ def run_section(about: Mapping[str, Any]) -> Section:
     facts = {key: str(value) for key, value in facts.items() if value != ""}
     frame = pd.DataFrame({"": list(facts.values())}, index=list(facts), dtype=object)
     return Section("This run", "command, machine, versions", [Table(frame, css="text plain")], True)
+
+
+Said = tuple[str, Sequence[str]]
+"""A sentence of the check, and the lines of the file and the exercise's formula behind it."""
+
+
+def sourced(sentence: str, lines: Sequence[str]) -> Markup:
+    small = Markup("<br><small>{} <code>{}</code></small>")
+    return Markup("").join([sentence, *(small.format(*line.split(": ", 1)) for line in lines)])
+
+
+def with_lines(says: Sequence[str], shown: Sequence[Sequence[str]]) -> list[Said]:
+    """Each sentence with its lines; a sentence that is no fault has none."""
+    none: list[Sequence[str]] = [[]] * len(says)
+    return list(zip(says, [*shown, *none]))

@@ -19,35 +19,21 @@ from markupsafe import Markup
 from crosscheck2d.adapters.engine import Unsupported
 from crosscheck2d.adapters.engines import OWN
 from crosscheck2d.adapters.snippets import write_snippet
-from crosscheck2d.reports.page import style
-from crosscheck2d.reports.page.findings import (
-    findings,
-    is_lawless,
-    not_counted,
-    own_engine_sentences,
-)
+from crosscheck2d.reports.page import findings, kit, style
 from crosscheck2d.reports.page.kit import (
-    Code,
-    Page,
     Part,
+    Said,
     Section,
     Table,
     TableCell,
     Text,
-    render_page,
-    run_section,
+    neighbours,
+    sourced,
+    with_lines,
 )
-from crosscheck2d.reports.page.links import neighbours
-from crosscheck2d.reports.page.own_solvers import Said, sourced, with_lines
 from crosscheck2d.reports.page.scene_map import map_section, numbers, remarks, replays, title_of
 from crosscheck2d.reports.page.scenes import is_library, label, long_label
-from crosscheck2d.reports.page.summary import (
-    RunTimes,
-    Summary,
-    error_text,
-    step_text,
-    summarize,
-)
+from crosscheck2d.reports.page.summary import Summary, error_text, run_times, step_text, summarize
 from crosscheck2d.reports.page.trade_offs import cost_against_size, error_against_cost, limits
 from crosscheck2d.reports.run.results import RunResults
 from crosscheck2d.reports.run.tables import comparisons_of, make_tables
@@ -72,24 +58,12 @@ COMMANDS = {
 
 @dataclass(frozen=True, eq=False)
 class Report:
-    """The results of a run.
-
-    Attributes:
-        results: what it was made from.
-        runs: runs.csv.
-        summary: its scenes, and what the first table says of them.
-        findings: its sentences, which the command prints.
-        unjudged: name of a scene -> why it is not compared with its answer, or not at all, though
-            it should be.
-        said: a solver's file, `PATH:own` -> what `crosscheck check` says of it.
-    """
-
-    results: RunResults
-    runs: pd.DataFrame
+    results: RunResults  # what it was made from
+    runs: pd.DataFrame  # runs.csv
     summary: Summary
-    findings: list[str]
-    unjudged: Mapping[str, str]
-    said: Mapping[str, list[str]]
+    findings: list[str]  # sentences, which the command prints
+    unjudged: Mapping[str, str]  # a scene -> why it is not compared with its answer, or not at all
+    said: Mapping[str, list[str]]  # a solver's file, `PATH:own` -> what `crosscheck check` says
 
 
 def make_report(results: RunResults, say: Callable[[str], None]) -> Report:
@@ -114,13 +88,15 @@ def make_report(results: RunResults, say: Callable[[str], None]) -> Report:
         for row in reversed(rows)  # so that the first fault is reported
         if row["verdict"] == "breaks"
     }
-    untrusted = {*broken, *(name for name, rows in zip(engines, probes) if is_lawless(rows))}
+    lawless = (name for name, rows in zip(engines, probes) if findings.is_lawless(rows))
+    untrusted = {*broken, *lawless}
     own = {name: row for name, row in broken.items() if name.endswith(OWN)}
-    first = [sentence for rows in probes for sentence in own_engine_sentences(rows)]
-    first += not_counted(own)
-    last = not_counted({name: row for name, row in broken.items() if name not in own})
-    times = tables.timed, noise_floor(results), header["timings"], take_times(results.folder)
-    summary = summarize(comparisons, untrusted, RunTimes(*times))
+    first = [sentence for rows in probes for sentence in findings.own_engine_sentences(rows)]
+    first += findings.not_counted(own)
+    last = findings.not_counted({name: row for name, row in broken.items() if name not in own})
+    limit, again = header["timings"], take_times(results.folder)
+    times = run_times(tables.timed, noise_floor(results), limit, again)
+    summary = summarize(comparisons, untrusted, times)
     cells = counted(len(results.records), "cell")
     unfinished = "" if results.complete else f"The run was stopped after {cells}."
     checks = results.checked
@@ -139,7 +115,7 @@ def make_report(results: RunResults, say: Callable[[str], None]) -> Report:
     )
     results.store.export(PAGE, page)
     says = {name: row["says"] for name, row in checks.items()}
-    sentences = [*first, *findings(summary), *last]
+    sentences = [*first, *findings.findings(summary), *last]
     return Report(results, tables.runs, summary, sentences, tables.unjudged, says)
 
 
@@ -157,14 +133,11 @@ def report_page(
     about: Mapping[str, Any],
     checks: Mapping[str, Sequence[Said]] = MappingProxyType({}),
 ) -> str:
-    """The page of the scenes of `summary`, which will stand at `path`.
+    """The page of the scenes of `summary`, which will stand at `path`; it begins with `first`.
 
-    Args:
-        first: sentences before all others: what the reader's own engines break, who is not ranked.
-        conformance: a row for each question of a probe.
-        known_answers: a row for each reproduced published number.
-        about: command, seed, machine, versions, started, and why it is unfinished, or "".
-        checks: a solver's file -> what `crosscheck check` says of it.
+    `conformance` has a row for each question of a probe, `known_answers` one for each reproduced
+    published number; `about`: command, seed, machine, versions, started, and why it is unfinished,
+    or ""; `checks`: a solver's file -> what `crosscheck check` says of it.
     """
     lead: list[str | Markup] = [*filter(None, [about["unfinished"]]), *first]
     sections: list[Section | None] = []
@@ -189,17 +162,16 @@ def report_page(
     table = Table(
         pd.DataFrame({"": list(COMMANDS.values())}, commands, dtype=object), css="plain text"
     )
-    runs = [run for scene in summary.scenes for run in scene.comparison.runs if run.versions]
-    versions = {run.engine: ", ".join(map(" ".join, run.versions.items())) for run in runs}
+    versions = [f"{k}: {', '.join(map(' '.join, v.items()))}" for k, v in summary.versions.items()]
     sections += [
         settings_section(summary),
         conformance_section(conformance),
         Section("Your solver, your scene", "commands", [table], folded=True, id="commands"),
         trust_section(summary, known_answers),
-        run_section({**about, "engines": [f"{name}: {of}" for name, of in versions.items()]}),
+        kit.run_section({**about, "engines": versions}),
     ]
-    return render_page(
-        Page(
+    return kit.render_page(
+        kit.Page(
             title,
             [section for section in sections if section is not None],
             GENERATOR,
@@ -272,7 +244,7 @@ def settings_section(summary: Summary) -> Section | None:
         code: list[Part] = []
         with suppress(Unsupported, ImportError):  # a run of another machine
             dt = scene.comparison.middle_dt
-            code = [Code(write_snippet(name, scene.comparison.scenario.scene, dt))]
+            code = [kit.Code(write_snippet(name, scene.comparison.scenario.scene, dt))]
         table = Table(frame, css="plain text", corner=label(name))
         parts.append(Section(label(name), says, [*code, table], True, f"settings_{engine}"))
     intro = Text(

@@ -17,16 +17,17 @@ from crosscheck2d.reports.page import replay, style
 from crosscheck2d.reports.page.kit import Part, Playback, Section, Table, TableCell, Text
 from crosscheck2d.reports.page.scenes import (
     EXACT,
+    FRICTION,
     LOST,
     OURS,
     SEEN,
+    SPIN,
     SceneScores,
     is_library,
     label,
     long_label,
     values,
 )
-from crosscheck2d.reports.page.situations import FRICTION, SPIN
 from crosscheck2d.reports.page.summary import MEANING, Summary, error_text, stand_in, step_text
 
 GRADES = (
@@ -51,20 +52,19 @@ def map_section(summary: Summary) -> Section:
     groups = [(title, names) for title, names in groups if names]
     order = [kind for kind in MEANING if kind not in (SPIN, FRICTION)] + [FRICTION]
     scenes = sorted(summary.scenes, key=lambda scene: order.index(scene.situations[0]))
-    rows = [[TableCell(scene.comparison.scenario.asks, css="ask")] for scene in scenes]
+    columns = [[TableCell(scene.comparison.scenario.asks, css="ask") for scene in scenes]]
     heads, spans = [TableCell("", css="ask")], list[tuple[str | TableCell, int]]([("", 1)])
     for title, names in groups:
         # in as many lines as it has words
         spans.append((TableCell(Markup("<br>").join(title.split()), css="first"), len(names)))
         for name in names:
-            css = "mark" + " first" * (name == names[0])
-            profile = name.rpartition(":")[2]
+            first, profile = " first" * (name == names[0]), name.rpartition(":")[2]
             short = "ev" if name.startswith("event") else profile[: 1 if is_library(name) else 2]
-            heads.append(TableCell(short, name.replace(":", " "), css=css))
-            for scene, row in zip(scenes, rows):
-                row.append(mark(scene, name, " first" * (name == names[0])))
+            heads.append(TableCell(short, name.replace(":", " "), css=f"mark{first}"))
+            columns.append([mark(scene, name, first) for scene in scenes])
     titles = [title_of(scene) for scene in scenes]
-    frame = pd.DataFrame(rows, titles, dtype=object).set_axis(heads, axis="columns")
+    frame = pd.DataFrame(dict(enumerate(columns)), titles, dtype=object)
+    frame = frame.set_axis(heads, axis="columns")
     kinds = [scene.situations[0] for scene in scenes]
     small = Markup("{} <small>{}</small>")
     opens = [[*replays(scene, summary), *remarks(scene), *numbers(scene)] for scene in scenes]

@@ -57,18 +57,14 @@ def taken_socket(port: int) -> socket.socket:
     """
     last = min(port + PORTS, 65536) - 1
     for number in range(port, last + 1):
-        listening = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         try:
-            listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            listening.bind((HOST, number))
-            listening.listen(64)
-            return listening
-        except OSError as fault:
-            listening.close()
-            if isinstance(fault, PermissionError):
-                raise OSError(
-                    "the system keeps it for administrators, as it does ports below 1024"
-                ) from None
+            return socket.create_server((HOST, number), backlog=64)
+        except PermissionError:
+            raise OSError(
+                "the system keeps it for administrators, as it does ports below 1024"
+            ) from None
+        except OSError:
+            continue
     raise OSError(f"none of the ports {port} to {last} is free")
 
 

@@ -4,8 +4,8 @@ and the sentences above it."""
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -22,10 +22,13 @@ from crosscheck2d.reports.page.scenes import (
     ANGLE,
     ERROR,
     EXACT,
+    FRICTION,
     LIBRARIES,
     LOST,
     OURS,
     RIGHT,
+    SITUATIONS,
+    SPIN,
     TIE,
     WITH_FRICTION,
     SceneScores,
@@ -34,9 +37,8 @@ from crosscheck2d.reports.page.scenes import (
     scenes_of,
     smooth,
 )
-from crosscheck2d.reports.page.situations import FRICTION, SITUATIONS, SPIN
-from crosscheck2d.reports.run.timing import Noise, noise_of
-from crosscheck2d.reports.run.timing_pass import BUSY, COLUMNS
+from crosscheck2d.reports.run.timing import Noise
+from crosscheck2d.reports.run.timing_pass import BUSY
 from crosscheck2d.reports.terminal.counts import counted, listed
 
 WITHOUT = "All"
@@ -55,37 +57,30 @@ MOST_WORDS = 2  # in a cell
 
 
 class RunTimes(NamedTuple):
-    """The times of a run.
-
-    Attributes:
-        table: timings.csv.
-        noise: the ratios of two timings of one engine.
-        limit: of the timing pass, s.
-        again: the command that takes the times.
-    """
+    """timings.csv of a run, and why no time of it is shown, as a sentence; "" if times are."""
 
     table: pd.DataFrame
-    noise: Noise
-    limit: float
-    again: str = ""
-
-    @property
-    def fault(self) -> str:
-        """Why no time is shown, as a sentence; "" if times are shown."""
-        take = f" To take them: {self.again}" if self.again else ""
-        if self.table.empty and not self.limit:
-            return f"No times were taken.{take}"
-        if self.table.empty or not self.noise.pairs:
-            return f"The engines could not be timed within {self.limit:g} s.{take}"
-        if self.noise.floor > BUSY:
-            return (
-                "The machine was busy: an engine timed twice differs from itself by"
-                f" {style.number(100 * self.noise.floor, 2)} %, so no times are shown.{take}"
-            )
-        return ""
+    fault: str
 
 
-NO_CLOCK = RunTimes(pd.DataFrame(columns=COLUMNS), noise_of([]), 0.0)
+NO_CLOCK = RunTimes(pd.DataFrame(), "No times were taken.")
+
+
+def run_times(table: pd.DataFrame, noise: Noise, limit: float, again: str = "") -> RunTimes:
+    """The times of a run, with the ratios of two timings of one engine, the limit of the timing
+    pass in s, and the command that takes them again."""
+    if table.empty and not limit:
+        fault = "No times were taken."
+    elif table.empty or not noise.pairs:
+        fault = f"The engines could not be timed within {limit:g} s."
+    elif noise.floor > BUSY:
+        fault = (
+            "The machine was busy: an engine timed twice differs from itself by"
+            f" {style.number(100 * noise.floor, 2)} %, so no times are shown."
+        )
+    else:
+        return RunTimes(table, "")
+    return RunTimes(table, f"{fault} To take them: {again}" if again else fault)
 
 
 class Choice(NamedTuple):
@@ -100,20 +95,13 @@ class Choice(NamedTuple):
 @dataclass(frozen=True, eq=False)
 class Summary:
     """The scenes of a run, and what the first table says of them. Engines are named
-    `engine:profile`, situations as in `MEANING`.
-
-    Attributes:
-        scenes: all of them.
-        names: every engine that was played.
-        untrusted: those that broke the protocol, and the reader's own that break a law: their rows
-            stay in the tables, but they are not ranked.
-        clock: the times of the run.
-    """
+    `engine:profile`, situations as in `MEANING`."""
 
     scenes: Sequence[SceneScores]
-    names: Sequence[str]
+    names: Sequence[str]  # every engine that was played
+    # those that broke the protocol, and the reader's own that break a law: they are not ranked
     untrusted: frozenset[str] = frozenset()
-    clock: RunTimes = field(default=NO_CLOCK)
+    clock: RunTimes = NO_CLOCK
 
     @cached_property
     def profiles(self) -> dict[str, list[str]]:
@@ -138,6 +126,11 @@ class Summary:
             if nearer < farther:
                 chosen[library] = Choice(names[0], farther, nearer)
         return chosen
+
+    @cached_property
+    def versions(self) -> dict[str, Mapping[str, str]]:
+        runs = [run for scene in self.scenes for run in scene.comparison.runs if run.versions]
+        return {run.engine: run.versions for run in runs}
 
     @cached_property
     def libraries(self) -> list[str]:
@@ -169,9 +162,11 @@ class Summary:
     def error(self, name: str, kind: str) -> float:
         # the median; inf where an engine fails in half of the scenes
         metric = ANGLE if kind == SPIN else ERROR
-        errors = [s.error(stand_in(name, s), metric=metric) for s in self.situations[kind]]
-        known = [error for error in errors if not np.isnan(error)]
-        return float(np.median(known)) if known else np.nan
+        return median([s.error(run, metric=metric) for s, run in self.runs(name, kind)])
+
+    def runs(self, name: str, kind: str) -> list[tuple[SceneScores, str]]:
+        """Each scene of a situation, with the engine that counts there."""
+        return [(scene, stand_in(name, scene)) for scene in self.situations[kind]]
 
     @cached_property
     def times(self) -> dict[tuple[str, str, float], float]:
@@ -194,9 +189,8 @@ class Summary:
 
     def cost(self, name: str, kind: str) -> float:
         # µs of a step, geometric mean of the timed scenes
-        keys = [(scene.name, stand_in(name, scene)) for scene in self.situations[kind]]
-        costs = [self.costs[key] for key in keys if key in self.costs]
-        return float(np.exp(np.mean(np.log(costs)))) if costs else np.nan
+        costs = [self.costs.get((scene.name, run), np.nan) for scene, run in self.runs(name, kind)]
+        return float(np.exp(np.nanmean(np.log(costs)))) if np.isfinite(costs).any() else np.nan
 
     def best(self, kind: str) -> float:
         errors = [self.error(name, kind) for name in self.libraries]
@@ -216,7 +210,7 @@ class Summary:
         """What goes wrong in a situation, the gravest first; each opens its worst scene."""
         if kind == SPIN:
             return []
-        runs = {scene: stand_in(name, scene) for scene in self.situations[kind]}
+        runs = dict(self.runs(name, kind))
         of = f"of {counted(len(runs), 'scene')}"
         words = []
         for verdict in VERDICTS:
@@ -264,25 +258,18 @@ class Summary:
         if name in self.libraries and profile != "matched":
             about += f", {profile}"
         title = label(name)
-        runs = [run for scene in self.scenes[:1] for run in scene.comparison.runs if run.versions]
-        versions = {run.engine: next(iter(run.versions.values())) for run in runs}
-        if is_library(name) and engine in versions and not title[-1:].isdigit():
-            title += " " + ".".join(versions[engine].split(".")[:2])
+        if is_library(name) and engine in self.versions and not title[-1:].isdigit():
+            title += " " + ".".join(next(iter(self.versions[engine].values())).split(".")[:2])
         link = f"#settings_{engine}" if name in self.libraries else ""
         return TableCell(title, name, link, notes=(TableCell(about, css="soft"),))
 
     def section(self) -> Section:
         kinds = [kind for kind in MEANING if kind in self.situations]
-        cells = {
-            k: [self.cell(name, kind) for kind in kinds] for k, name in enumerate(self.columns)
-        }
-        index = [
-            TableCell(
-                kind, css="last" * (kind == WITHOUT), notes=(TableCell(MEANING[kind], css="soft"),)
-            )
-            for kind in kinds
-        ]
-        frame = pd.DataFrame(cells, index, dtype=object)
+        rows = [[self.cell(name, kind) for name in self.columns] for kind in kinds]
+        about = {kind: (TableCell(MEANING[kind], css="soft"),) for kind in kinds}
+        last = {WITHOUT: "last"}
+        index = [TableCell(kind, css=last.get(kind, ""), notes=about[kind]) for kind in kinds]
+        frame = pd.DataFrame(rows, index, dtype=object)
         frame = frame.set_axis([self.heading(name) for name in self.columns], axis="columns")
         steps = Counter(step_text(scene.comparison.middle_dt) for scene in self.scenes)
         step = steps.most_common(1)[0][0] + (" in most scenes" if len(steps) > 1 else "")
@@ -357,6 +344,12 @@ def summarize(
 ) -> Summary:
     names = list(dict.fromkeys(run.name for each in comparisons for run in each.runs))
     return Summary(scenes_of(comparisons), names, frozenset(untrusted), clock)
+
+
+def median(errors: Sequence[float]) -> float:
+    """Of those that are known; nan of none, inf where half of them are."""
+    known = [error for error in errors if not np.isnan(error)]
+    return float(np.median(known)) if known else np.nan
 
 
 def stand_in(name: str, scene: SceneScores) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -66,27 +65,19 @@ def make_line(
 ) -> Line:
     """(cost, error) at each step size: the geometric mean of the timed scenes, the median of all
     scenes; a scene with fewer step sizes is left out where it has none."""
-    costs: dict[int, list[float]] = {}  # number of the step size -> of each scene
-    errors: dict[int, list[float]] = {}
-    usual = Counter[int]()
+    rows = []
     for scene in scenes:
         engine, scenario = stand_in(name, scene), scene.comparison.scenario
         for k, dt in enumerate(map(scenario.dt, scenario.substeps)):
-            key = (scene.name, engine, rounded(dt))
-            costs.setdefault(k, []).append(
-                summary.times.get(key, np.nan) if summary.costs else 1 / dt
-            )
-            errors.setdefault(k, []).append(scene.error(engine, dt))
-            usual[k] += dt == scene.comparison.middle_dt
-    points = []
-    for k in sorted(costs):
-        cost, error = (np.array(values)[~np.isnan(values)] for values in (costs[k], errors[k]))
-        if len(cost) and len(error):
-            points.append((np.exp(np.mean(np.log(cost))), np.median(error) or np.nan))
-    x, y = zip(*points) if points else ((), ())
+            cost = summary.times.get((scene.name, engine, rounded(dt)), np.nan)
+            cost = np.log(cost if summary.costs else 1 / dt)
+            rows.append((k, cost, scene.error(engine, dt), dt == scene.comparison.middle_dt))
+    table = pd.DataFrame(rows, columns=["step", "cost", "error", "usual"]).groupby("step")
+    points = table.agg({"cost": "mean", "error": "median"}).dropna()
     # of several numbers that are usual in as many scenes the smallest
-    filled = -1 if faint else max(sorted(usual), key=usual.__getitem__)
-    return Line(name, x, y, "" if faint else label(name), filled, faint)
+    filled = -1 if faint else int(table.usual.sum().argmax())
+    error = points.error.where(points.error > 0)
+    return Line(name, np.exp(points.cost), error, "" if faint else label(name), filled, faint)
 
 
 def cost_against_size(summary: Summary) -> Section | None:

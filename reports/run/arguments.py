@@ -9,7 +9,16 @@ from contextlib import ExitStack, contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 
-from crosscheck2d.adapters.engines import ENGINES, FETCHED, OWN, UNASKED, packages, parsed, read_row
+from crosscheck2d.adapters.engines import (
+    ENGINES,
+    FETCHED,
+    NAMED,
+    OWN,
+    UNASKED,
+    packages,
+    parsed,
+    read_row,
+)
 from crosscheck2d.adapters.host.file import HINTS, KINDS, NotASolver
 from crosscheck2d.adapters.library_at_version import ABSENT, LibraryAtVersion, NotInstalled
 from crosscheck2d.adapters.npm_packages import fetch, missing, version_of
@@ -76,9 +85,9 @@ def checked_scenes(scenes: Sequence[str], dts: Sequence[float], full: bool, seed
 def checked_engines(asked: Sequence[str], unasked: Collection[str] = UNASKED) -> list[str]:
     """The rows of the requested engines: NAME[@VERSION][:PROFILE], or a solver's FILE, which is
     read now. A version comes after the pinned one, files come last. A NAME alone gives its rows of
-    `unasked` or `FETCHED`; without a request all of `unasked` are used. A missing package is
-    fetched."""
-    known = [*ENGINES, *FETCHED]
+    `unasked`, `FETCHED` or `NAMED`; without a request all of `unasked` are used. A missing package
+    is fetched."""
+    known = [*ENGINES, *FETCHED, *NAMED]
     chosen: dict[str, list[str]] = {}  # row -> itself, and it at other versions
     own: list[str] = []
     faults: list[str] = []
@@ -88,7 +97,7 @@ def checked_engines(asked: Sequence[str], unasked: Collection[str] = UNASKED) ->
             faults += faults_of_file(file)
             continue
         usual, library = parsed(name)
-        matching = {row for row in (*unasked, *FETCHED) if row.split(":")[0] == usual}
+        matching = {row for row in (*unasked, *FETCHED, *NAMED) if row.split(":")[0] == usual}
         matching |= {row for row in known if row == usual}
         if not matching:
             faults.append(unknown_engine(name, known))
@@ -126,9 +135,9 @@ def of_main_job() -> list[str]:
 
 
 def faults_of_packages(rows: Iterable[str]) -> list[str]:
-    """Fetches the packages of those `rows` that are in `FETCHED`; returns why they cannot be
-    played."""
-    packages = dict.fromkeys(FETCHED[row].package for row in rows if row in FETCHED)
+    """Fetches the npm packages of `rows`; returns why they cannot be played."""
+    fetched = FETCHED | NAMED
+    packages = dict.fromkeys(fetched[row].package for row in rows if row in fetched)
     lacking = {package: why for package in packages if (why := missing(package))}
     if not lacking:
         return []

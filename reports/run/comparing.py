@@ -17,8 +17,7 @@ import pandas as pd
 
 from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.compare.against import TRUTH
-from crosscheck2d.reports.compare.comparison import compare
-from crosscheck2d.reports.compare.table import status_row, table_of
+from crosscheck2d.reports.compare.comparison import compare, status_row, table_of
 from crosscheck2d.reports.compare.view import NOT_JUDGED
 from crosscheck2d.reports.run.cells import digest, judge_hash
 from crosscheck2d.reports.run.playing import load_trajectory

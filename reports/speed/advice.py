@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from itertools import islice
 from math import ceil, inf, isfinite, isnan, log, nan
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -19,8 +19,8 @@ from crosscheck2d.adapters.engine import Engine
 from crosscheck2d.adapters.engines import OWN, row_of
 from crosscheck2d.adapters.mechanisms.options import OPTIONS
 from crosscheck2d.adapters.play import play_once
+from crosscheck2d.reports.compare.accuracy import kept_from
 from crosscheck2d.reports.compare.delays import jumps_of
-from crosscheck2d.reports.compare.pareto import kept_from
 from crosscheck2d.reports.compare.verdicts import first_failed
 from crosscheck2d.reports.compare.view import View, beside, cut
 from crosscheck2d.reports.page.style import number
@@ -37,7 +37,7 @@ from crosscheck2d.reports.speed.ladder import (
     starts_within_a_step,
     times_of,
 )
-from crosscheck2d.reports.speed.measure import done
+from crosscheck2d.reports.speed.measure import do_all
 from crosscheck2d.reports.speed.plan import PLAIN, doublings
 from crosscheck2d.reports.speed.tables import summed_up
 from crosscheck2d.reports.terminal.progress import Progress
@@ -360,38 +360,35 @@ class Inquiry:
     def attempts(self, asked: Iterable[tuple[str, str, int]]) -> list[Attempt]:
         dt = self.part.scenario.dt
         wanted = [Attempt(name, change, k, dt(k), nan) for name, change, k in asked]
-        return [
-            replace(attempt, error=inf, reason=f"{outcome.status}: {outcome.reason}")
-            if isinstance(outcome, Failure)
-            else outcome
-            for attempt, outcome in self.outcomes(wanted, self.requirement.play, "playing")
-        ]
+        return self.outcomes(wanted, self.requirement.play, "playing", error=inf)
 
     def from_every_start(self, wanted: Sequence[Attempt], every: int = 1) -> list[Attempt]:
         play = partial(self.requirement.play_starts, every=every)
         what = f"playing from {STARTS // every} instants of a step"
-        return [
-            replace(attempt, starts=(inf,) * STARTS) if isinstance(outcome, Failure) else outcome
-            for attempt, outcome in self.outcomes(wanted, play, what)
-        ]
+        return self.outcomes(wanted, play, what, starts=(inf,) * STARTS)
 
     def to_the_end(self, wanted: Sequence[Attempt]) -> tuple[list[Attempt], list[Attempt]]:
         """The attempts that play the whole scene and fail no verdict in it; and those that do not,
         each with the reason."""
-        able, unable = list[Attempt](), list[Attempt]()
-        play = self.requirement.play_to_the_end
-        for attempt, outcome in self.outcomes(wanted, play, "playing to the end"):
-            if isinstance(outcome, Failure):
-                outcome = replace(attempt, reason=f"{outcome.status}: {outcome.reason}")
-            (unable if outcome.reason else able).append(outcome)
-        return able, unable
+        played = self.outcomes(wanted, self.requirement.play_to_the_end, "playing to the end")
+        return [x for x in played if not x.reason], [x for x in played if x.reason]
 
     def outcomes(
-        self, wanted: Sequence[Attempt], play: Callable[[Attempt], Attempt], what: str
-    ) -> list[tuple[Attempt, Attempt | Failure]]:
+        self,
+        wanted: Sequence[Attempt],
+        play: Callable[[Attempt], Attempt],
+        what: str,
+        **failed: Any,
+    ) -> list[Attempt]:
+        """The attempts played; those whose worker failed with these fields, and the reason."""
         tasks = {attempt.task: partial(play, attempt) for attempt in wanted}
-        results = dict(done(tasks, self.workers, self.progress, what, PATIENCE))
-        return [(attempt, results[attempt.task]) for attempt in wanted]
+        results = do_all(tasks, self.workers, self.progress, what, PATIENCE)
+        for attempt in wanted:
+            result = results[attempt.task]
+            if isinstance(result, Failure):
+                reason = f"{result.status}: {result.reason}"
+                results[attempt.task] = replace(attempt, reason=reason, **failed)
+        return [results[attempt.task] for attempt in wanted]
 
     def confirmed(
         self, ladders: Sequence[Sequence[Attempt]]
@@ -439,7 +436,7 @@ class Inquiry:
         scene, seed, *_ = self.requirement
         task = partial(times_of, scene, seed, makes, ROUNDS, BUDGET, whole=True)
         busy = busy_cores()
-        [(_, samples)] = done({("time",): task}, 1, self.progress, "timing", ALL_ROUNDS)
+        [samples] = do_all({("time",): task}, 1, self.progress, "timing", ALL_ROUNDS).values()
         if isinstance(samples, Failure):
             raise NoAdvice(f"the timing ended: {samples.status}: {samples.reason}")
         times = summed_up(pd.DataFrame(samples), ["key"])
@@ -472,7 +469,7 @@ class Inquiry:
                 at = next(attempt for attempt in ladder if attempt.error <= 2 * least.error)
                 bits = row_of(least.name).bits_of or least.name  # what plays the same
                 tasks[least.task] = partial(self.requirement.find_cause, bits, at.substeps)
-        causes = dict(done(tasks, self.workers, self.progress, "cause of the error", SEARCH))
+        causes = do_all(tasks, self.workers, self.progress, "cause of the error", SEARCH)
         rows = []
         for row in zip(best, (ladder[-1].error for ladder in ladders), usual, longest):
             name, reason = row[0].name, row[0].reason

@@ -6,9 +6,12 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Sequence
-from math import isfinite, isnan
+from collections.abc import Mapping, Sequence
+from math import inf, isfinite, nan
+from operator import attrgetter
 from typing import Any, NoReturn
+
+import numpy as np
 
 from crosscheck2d.adapters.engines import ENGINES, row_of, told_apart
 from crosscheck2d.adapters.snippets import write_snippet
@@ -24,17 +27,34 @@ from crosscheck2d.reports.speed.advice import (
     Attempt,
     Inquiry,
     NoAdvice,
-    OutOfReach,
     Requirement,
-    reach,
 )
 from crosscheck2d.reports.speed.ladder import PURPOSES, STARTS
 from crosscheck2d.reports.terminal.console import Console, print_table, print_texts
 from crosscheck2d.reports.terminal.exits import DONE, FAILED, refuse, say
 from crosscheck2d.reports.terminal.progress import Progress
 
+Row = dict[str, Any]
 SHOWN = 3  # ranks: the cheapest and the next two
-LIBRARIES, OWN_SOLVERS = "libraries", "solvers of this project"
+# fields of the answer, and of its rows -> attributes
+ANSWER = {"scenario": "scene", "purpose": "purpose", "error_at_most": "bound", "until_s": "until"}
+ANSWER |= {"duration_s": "duration", "collisions_judged": "collisions", "dt_s_tried": "step_sizes"}
+ATTEMPT = {"engine": "name", "library": "is_library", "dt_s": "dt", "error": "error"}
+CHANGE = {"change": "changed.change", "error_without": "plain.error"}
+NINE, AT = "9 of 10\nuntil, s", "at dt,\nms"
+SHORT = {  # and headings
+    "error_at_finest": ("finest", ""),
+    "kept_until_s": ("usual.until", "until,\ns"),
+    "kept_from_nine_tenths_until_s": ("usual.lasting", NINE),
+    "at_dt_s": ("usual.dt", AT),
+    "longest_until_s": ("longest.until", "longest\nuntil,\ns"),
+    "longest_from_nine_tenths_until_s": ("longest.lasting", NINE),
+    "longest_at_dt_s": ("longest.dt", AT),
+    "why": ("reason", ""),
+}
+# tables: a field of their rows -> its heading; step sizes are shown in ms
+CHOICES = {"rank": "", "engine": "engine", "dt_s": "dt, ms", "error": "error"}
+CHOICES |= {"error_of_nine_tenths": "9 of 10\nwithin", "us_per_simulated_s": "µs per\nsimulated s"}
 
 
 def give_advice(
@@ -57,7 +77,7 @@ def give_advice(
             sys.exit(FAILED)
     snippet = snippet_of(advice, checked, seed)
     if as_json:
-        print(json.dumps(to_json(advice) | {"snippet": snippet}, indent=1, allow_nan=False))
+        print(json.dumps(finite(answer_of(advice)) | {"snippet": snippet}, indent=1))
     else:
         print_advice(advice, snippet)
     sys.exit(DONE if advice.keeping else FAILED)
@@ -82,102 +102,88 @@ def snippet_of(advice: Advice, scene: str, seed: int) -> str:
     return ""
 
 
-def to_json(advice: Advice) -> dict[str, Any]:
-    # a number that is not finite is null
-    return {
-        "scenario": advice.scene,
-        "purpose": advice.purpose,
-        "error_at_most": advice.bound,
-        "until_s": advice.until,
-        "duration_s": advice.duration,
-        "collisions_judged": advice.collisions,
-        "dt_s_tried": list(advice.step_sizes),
-        "cheapest_first": [
-            row_of_attempt(one)
-            | {
-                "rank": rank,
-                "error_of_nine_tenths": finite(one.usually),
-                "kept_in": one.kept_in(advice.bound),
-                "starts": len(one.starts),
-            }
-            for rank, one in advice.ranked
-        ],
-        "not_within": [
-            row_of_attempt(row.best)
-            | {
-                "error_at_finest": finite(row.finest),
-                "kept_until_s": finite(row.usual.until),
-                "kept_from_nine_tenths_until_s": finite(row.usual.lasting),
-                "at_dt_s": row.usual.dt,
-                "longest_until_s": finite(row.longest.until),
-                "longest_from_nine_tenths_until_s": finite(row.longest.lasting),
-                "longest_at_dt_s": row.longest.dt,
-                "why": row.reason,
-            }
-            for row in advice.short
-        ],
-        "not_to_the_end": [row_of_attempt(one) | {"why": one.reason} for one in advice.partial],
-        "changes": [
-            row_of_attempt(change.changed)
-            | {
-                "change": change.changed.change,
-                "error_without": finite(change.plain.error),
-                "cost_ratio": finite(change.changed.cost / change.plain.cost),
-                "verdict": change.verdict(advice.bound, advice.floor),
-            }
-            for change in advice.changes
-        ],
-        "noise": finite(advice.noise),
-        "cores_busy": finite(advice.busy),
-        "statistics": to_json(advice.statistics) if advice.statistics else None,
+def answer_of(advice: Advice) -> Row:
+    """The advice as `--json` gives it, where a number that is not finite is null."""
+
+    def row(attempt: Attempt) -> Row:
+        return fields(attempt, ATTEMPT) | {"us_per_simulated_s": attempt.cost * 1e6}
+
+    ranked = [
+        row(attempt)
+        | {"rank": rank, "error_of_nine_tenths": attempt.usually}
+        | {"kept_in": attempt.kept_in(advice.bound), "starts": len(attempt.starts)}
+        for rank, attempt in advice.ranked
+    ]
+    changes = [
+        row(change.changed)
+        | fields(change, CHANGE)
+        | {"cost_ratio": change.changed.cost / change.plain.cost}
+        | {"verdict": change.verdict(advice.bound, advice.floor)}
+        for change in advice.changes
+    ]
+    ends = {field: attribute for field, (attribute, _) in SHORT.items()}
+    return fields(advice, ANSWER) | {
+        "cheapest_first": ranked,
+        "not_within": [row(x.best) | fields(x, ends) for x in advice.short],
+        "not_to_the_end": [row(x) | {"why": x.reason} for x in advice.partial],
+        "changes": changes,
+        "noise": advice.noise,
+        "cores_busy": advice.busy,
+        "statistics": answer_of(advice.statistics) if advice.statistics else None,
     }
 
 
-def row_of_attempt(one: Attempt) -> dict[str, Any]:
-    return {
-        "engine": one.name,
-        "library": one.is_library,
-        "dt_s": one.dt,
-        "error": finite(one.error),
-        "us_per_simulated_s": finite(one.cost * 1e6),
-    }
+def fields(of: Any, attributes: Mapping[str, str]) -> Row:
+    return {field: attrgetter(path)(of) for field, path in attributes.items()}
 
 
-def finite(value: float) -> float | None:
-    return value if isfinite(value) else None
+def finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: finite(part) for key, part in value.items()}
+    if isinstance(value, list):
+        return [finite(part) for part in value]
+    return value if not isinstance(value, float) or isfinite(value) else None
 
 
 def print_advice(advice: Advice, snippet: str = "") -> None:
-    console = Console()
+    console, answer = Console(), answer_of(advice)
     question = f"{PURPOSES[advice.purpose].what}, at most {number(advice.bound)}"
     console.print(f"{advice.scene}: {question}, {advice.judged}\n", highlight=False)
     if advice.keeping and not advice.quiet:  # before the costs that it concerns
         console.print(f"{sentence_on_times(advice)}\n", highlight=False)
-    for group in (LIBRARIES, OWN_SOLVERS):
-        print_group(console, advice, group)
-    if advice.partial:
-        reasons = {attempt.name: attempt.reason for attempt in advice.partial}
-        print_texts(console, reasons, "Not advised: what goes wrong in the whole scene")
-        console.print()
-    if advice.short:
-        print_texts(console, {row.best.name: row.reason for row in advice.short}, "Why")
-        console.print()
+    print_group(console, advice, answer, True)
+    if statistics := advice.statistics:
+        console.print(
+            f"Averages over time need less: `--for {STATISTICS}` (energies, distance from the"
+            f" start; at most {number(statistics.bound)})",
+            style="bold",
+        )
+        if statistics.keeping and not statistics.quiet:
+            console.print(sentence_on_times(statistics), highlight=False)
+        print_group(console, statistics, answer["statistics"], True)
+    print_group(console, advice, answer, False)
+    partial = "Not advised: what goes wrong in the whole scene"
+    for title, rows in ((partial, answer["not_to_the_end"]), ("Why", answer["not_within"])):
+        if rows:
+            print_texts(console, {row["engine"]: row["why"] for row in rows}, title)
+            console.print()
     if advice.changes:
         print_changes(console, advice)
     if advice.keeping and advice.quiet:
         console.print(f"{sentence_on_times(advice)}\n", highlight=False)
     if snippet:
         console.print("The settings that were run:", style="bold")
-        console.print(snippet, highlight=False, markup=False, soft_wrap=True)
+        console.print(snippet, highlight=False, soft_wrap=True)
 
 
-def print_group(console: Console, advice: Advice, group: str) -> None:
+def print_group(console: Console, advice: Advice, answer: Row, library: bool) -> None:
     """Print the libraries, or the solvers of this project: those that keep the error, and until
-    when the others do; and where no library does, which do for averages over time."""
-    library = group == LIBRARIES
-    ranked = [(rank, each) for rank, each in advice.ranked if each.is_library is library]
-    short = [row for row in advice.short if row.best.is_library is library]
-    partial = any(attempt.is_library is library for attempt in advice.partial)
+    when the others do."""
+    ranked, short, partial = (
+        [row for row in answer[key] if row["library"] is library]
+        for key in ("cheapest_first", "not_within", "not_to_the_end")
+    )
+    group = "Libraries" if library else "Solvers of this project"
     if ranked:
         print_choices(console, advice, ranked, group)
     elif short or partial:
@@ -188,83 +194,57 @@ def print_group(console: Console, advice: Advice, group: str) -> None:
         print_short(console, advice, short, group)
     if ranked or short or partial:
         console.print()
-    if library and advice.statistics is not None:
-        statistics = advice.statistics
-        console.print(
-            f"Averages over time need less: `--for {STATISTICS}` (energies, distance from the"
-            f" start; at most {number(statistics.bound)})",
-            style="bold",
-        )
-        if not statistics.quiet and statistics.keeping:
-            console.print(sentence_on_times(statistics), highlight=False)
-        print_group(console, statistics, LIBRARIES)
 
 
-def print_choices(
-    console: Console, advice: Advice, ranked: Sequence[tuple[int, Attempt]], group: str
+def print_rows(
+    console: Console, rows: Sequence[Row], headings: Mapping[str, str], title: str
 ) -> None:
-    rows = [
-        [str(rank) if advice.quiet else "–", each.name]
-        + [number(value) for value in (each.dt * 1e3, each.error, each.usually, each.cost * 1e6)]
-        for rank, each in ranked
-        if rank <= SHOWN
-    ]
-    headings = ["", "engine", "dt, ms", "error", "9 of 10\nwithin", "µs per\nsimulated s"]
-    title = f"{group.capitalize()}, cheapest first"
+    def cell(field: str, value: Any) -> str:
+        return value if field == "engine" else number(value * (1e3 if "dt_s" in field else 1))
+
+    cells = [[cell(field, row[field]) for field in headings] for row in rows]
+    print_table(console, [*headings.values()], cells, title)
+
+
+def print_choices(console: Console, advice: Advice, ranked: Sequence[Row], group: str) -> None:
+    part = ", in the whole scene"
     if advice.until < advice.duration:
-        title += f": error {advice.judged}; cost of the whole scene"
-    else:
-        title += ", in the whole scene"
-    print_table(console, headings, rows, title)
+        part = f": error {advice.judged}; cost of the whole scene"
+    shown = [row for row in ranked if row["rank"] <= SHOWN]
+    rows = shown if advice.quiet else [row | {"rank": nan} for row in shown]
+    print_rows(console, rows, CHOICES, f"{group}, cheapest first{part}")
     console.print(
         f"9 of 10 within: the error of nine tenths of runs from {STARTS} instants of a step.",
         highlight=False,
     )
-    if dearer := ranked[len(rows) :]:
-        names = ", ".join(f"{each.name} ({number(each.cost * 1e6)} µs)" for _, each in dearer)
-        console.print(f"Also within it: {names}.", highlight=False)
+    if dearer := ranked[len(shown) :]:
+        costs = (f"{row['engine']} ({number(row['us_per_simulated_s'])} µs)" for row in dearer)
+        console.print(f"Also within it: {', '.join(costs)}.", highlight=False)
 
 
-def print_short(
-    console: Console, advice: Advice, rows_short: Sequence[OutOfReach], group: str
-) -> None:
+def print_short(console: Console, advice: Advice, short: Sequence[Row], group: str) -> None:
     # how near they come; and of an error that only grows until when they keep it
-
-    def until(one: Attempt) -> list[str]:
-        return ["–" if isnan(t) else number(t) for t in (one.until, one.lasting)] + [ms(one.dt)]
-
-    def ms(seconds: float) -> str:
-        return number(seconds * 1e3)
-
-    coarse, fine = ms(advice.step_sizes[0]), ms(advice.step_sizes[-1])
-    short = sorted(rows_short, key=lambda row: (-reach(row.longest), row.best.name))
-    headings, title = ["engine"], f"{group.capitalize()} that do not keep it"
-    rows = [[row.best.name] for row in short]
+    coarse, fine = (number(advice.step_sizes[k] * 1e3) for k in (0, -1))
+    until = {row["engine"]: float(np.nan_to_num(row["longest_until_s"], nan=-inf)) for row in short}
+    rows = sorted(short, key=lambda row: (-until[row["engine"]], row["engine"]))
+    finest = {"error_at_finest": f"error at\n{fine} ms"}
+    title = f"{group} that do not keep it"
     if advice.purpose in LASTING:
         title += f" to {number(advice.until)} s, and until when"
-        until_at = ["until,\ns", "9 of 10\nuntil, s", "at dt,\nms"]
-        headings += [*until_at, f"longest\n{until_at[0]}", *until_at[1:]]
-        rows = [
-            [*row, *until(x.usual), *until(x.longest), number(x.finest)]
-            for row, x in zip(rows, short)
-        ]
-        headings.append(f"error at\n{fine} ms")
+        kept = {field: heading for field, (_, heading) in SHORT.items() if heading}
+        headings = {"engine": "engine"} | kept | finest
         note = (
             f"At the usual step size, and at that of {coarse} to {fine} ms which keeps it longest;"
             f" 9 of 10: nine tenths of runs from {STARTS} instants of a step keep it until then."
         )
     else:
-        headings += [f"error at\n{fine} ms", "least\nerror", "at dt,\nms"]
-        rows = [
-            [*row, number(x.finest), number(x.best.error)]
-            + [ms(x.best.dt) if isfinite(x.best.error) else "–"]
-            for row, x in zip(rows, short)
-        ]
+        rows = [row if isfinite(row["error"]) else row | {"dt_s": nan} for row in rows]
+        headings = {"engine": "engine"} | finest | {"error": "least\nerror", "dt_s": AT}
         note = (
             f"Tried: {coarse} to {fine} ms. A step size counts only if it and every finer one keep"
             " the error, and it does from nine tenths of the instants of a step."
         )
-    print_table(console, headings, rows, title)
+    print_rows(console, rows, headings, title)
     console.print(note, highlight=False)
 
 

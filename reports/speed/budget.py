@@ -85,38 +85,24 @@ def budget_of(scene: str, seed: int, name: str, substeps: int) -> list[dict[str,
         note: why there are no numbers.
     """
     at = window_of(scene, seed, substeps)
-    scenario, dt = at.scenario, at.dt
-    engine, profile = name.split(":")
-    known = {
-        "scenario": scenario.name,
-        "seed": seed,
-        "engine": engine,
-        "profile": profile,
-        "dt_s": dt,
-        "until_s": scenario.duration,
-        "horizon_s": scored(scene, seed).scenario.duration,
-        "duration_s": open_scene(scene, seed).duration,
-    }
+    scenario, dt, horizon = at.scenario, at.dt, scored(scene, seed).scenario.duration
+    who = scenario.name, seed, *name.split(":"), dt
+    extents = scenario.duration, horizon, open_scene(scene, seed).duration
+    known: dict[str, Any] = dict(zip(WHOSE, (*who, *extents), strict=True))
     try:
         run = at.played(row_of(name).make)
         budget = Budget(at, mechanisms_of(name, run.settings, scenario.scene, dt), at.offset(run))
         contributions, checks = budget.contributions(), budget.ablated_in_both()
     except NotPlayed as failure:
         return [known | {"contribution": TOTAL, "note": str(failure)}]
-    checks[FLIGHT] = {
-        "closed_deviation_radii": at.flight_deviation(contributions[FLIGHT], row_of(name).alpha)
-    }
-    return [
-        known
-        | {
-            "contribution": contribution,
-            "position_radii": offset.radii,
-            "energy": offset.of_energy,
-            "note": "",
-        }
-        | checks.get(contribution, {})
-        for contribution, offset in contributions.items()
-    ]
+    deviation = at.flight_deviation(contributions[FLIGHT], row_of(name).alpha)
+    checks[FLIGHT] = {"closed_deviation_radii": deviation}
+    rows = []
+    for contribution, offset in contributions.items():
+        numbers = {"position_radii": offset.radii, "energy": offset.of_energy}
+        numbers |= checks.get(contribution, {})
+        rows.append(known | {"contribution": contribution, "note": ""} | numbers)
+    return rows
 
 
 def window_of(scene: str, seed: int, substeps: int) -> Window:
@@ -149,10 +135,8 @@ class Window:
         step late changes the whole energy."""
         scene, truth, played = self.scenario.scene, self.truth, run.trajectory
         assert played is not None
-        position = (
-            laws.difference(played, truth, scene)[:, ~scene.static]
-            / scene.radius[~scene.static, None]
-        )
+        moving = ~scene.static
+        position = laws.difference(played, truth, scene)[:, moving] / scene.radius[moving, None]
         energy = laws.energy(played, scene) - laws.energy(truth, scene)
         free = View(self.scenario, self.dt, played, truth).collision_free_samples
         return Offset(position, energy[free] / (scales.energy(self.scenario) or 1.0))
@@ -164,13 +148,10 @@ class Window:
         """radii, at most, from (alpha - 1/2) dt (v(t) - v(0)) up to the first collision; see
         `EngineRow.alpha`."""
         truth, scene = self.truth, self.scenario.scene
-        free = truth.t < truth.collisions.t.min(initial=np.inf)
-        gained = (truth.velocity - truth.velocity[0])[free][:, ~scene.static] / scene.radius[
-            ~scene.static, None
-        ]
-        return float(
-            np.abs(contribution.position[free] - (alpha - 0.5) * self.dt * gained).max(initial=0.0)
-        )
+        moving, free = ~scene.static, truth.t < truth.collisions.t.min(initial=np.inf)
+        gained = (truth.velocity - truth.velocity[0])[free][:, moving]
+        closed = (alpha - 0.5) * self.dt * (gained / scene.radius[moving, None])
+        return float(np.abs(contribution.position[free] - closed).max(initial=0.0))
 
 
 class Budget:
@@ -192,20 +173,11 @@ class Budget:
                 without = self.at.offset_of(mechanism.without)
                 contributions[mechanism.name] = engine - without
                 engine = without
-        outside = [
-            contributions[mechanism.name]
-            for mechanism in self.mechanisms
-            if not mechanism.parameters
-        ]
+        outside = [contributions[x.name] for x in self.mechanisms if not x.parameters]
         summed = reduce(add, contributions.values())
         reached = reduce(add, outside, self.reference(self.mechanisms))
-        return contributions | {
-            INTERPLAY: reached - summed,
-            RESIDUAL: self.total - reached,
-            SUM: summed,
-            ALL: reached,
-            TOTAL: self.total,
-        }
+        contributions |= {INTERPLAY: reached - summed, RESIDUAL: self.total - reached}
+        return contributions | {SUM: summed, ALL: reached, TOTAL: self.total}
 
     def contribution(self, mechanism: Mechanism) -> Offset:
         below = [each for each in self.mechanisms if each.name in mechanism.on_top]
@@ -257,30 +229,28 @@ def explained_share(table: pd.DataFrame) -> str:
     is left out, as the page and README show it; `table` as `explain` gives it."""
     are_explained = "is explained", "are explained"
     scenes, short = table.drop_duplicates("scenario"), cut_scenes(table)
-    engines = table[["engine", "profile"]].drop_duplicates().shape[0]
+    engines = len(table[["engine", "profile"]].drop_duplicates())
     played = table[table.note == ""]
     errors = played[played.error_radii > LEAST]
     exact, failed = len(played) - len(errors), len(table) - len(played)
     left = errors.residual_radii / errors.error_radii
     within = [int((left <= bound).sum()) for bound in TO]
+    whose = [f"{counted(engines, 'engine')} in {counted(len(scenes), 'scene')}"]
+    whose += [f"{exact} more below {LEAST:g} radii"] * (exact > 0)
+    whose += [f"{failed} not played"] * (failed > 0)
     sentence = (
-        f"of {counted(len(errors), 'error')} ({counted(engines, 'engine')} in"
-        f" {counted(len(scenes), 'scene')}"
-        + (f"; {exact} more below {LEAST:g} radii" if exact else "")
-        + (f"; {failed} not played" if failed else "")
-        + f") {counted(within[0], *are_explained)} to 1 %, {within[1]} to 0.1 %, "
-        f"over {scenes.until_s.sum():.0f} of {scenes.horizon_s.sum():.0f} simulated seconds"
+        f"of {counted(len(errors), 'error')} ({'; '.join(whose)})"
+        f" {counted(within[0], *are_explained)} to 1 %, {within[1]} to 0.1 %, over"
+        f" {scenes.until_s.sum():.0f} of {scenes.horizon_s.sum():.0f} simulated seconds"
     )
     if short.empty:
         return f"{sentence}, up to the end of every exact answer"
-    places = ", ".join(
-        f"{row.scenario} at {row.until_s:.2g} of {row.horizon_s:.2g} s"
-        for row in short.itertuples()
-    )
-    are_cut = "1 scene is" if len(short) == 1 else f"{len(short)} scenes are"
+    rows = zip(short.scenario, short.until_s, short.horizon_s)
+    places = ", ".join(f"{scene} at {until:.2g} of {end:.2g} s" for scene, until, end in rows)
     whole = left[~errors.scenario.isin(short.scenario)]
+    explained = counted(int((whole <= TO[0]).sum()), *are_explained)
     return (
-        f"{sentence}: {are_cut} cut where end-of-step detection alone puts a disk"
-        f" {LIMIT:g} radii off ({places}). Of the {counted(len(whole), 'error')} in scenes that are"
-        f" not cut, {counted(int((whole <= TO[0]).sum()), *are_explained)} to 1 %"
+        f"{sentence}: {counted(len(short), 'scene is', 'scenes are')} cut where end-of-step"
+        f" detection alone puts a disk {LIMIT:g} radii off ({places}). Of the"
+        f" {counted(len(whole), 'error')} in scenes that are not cut, {explained} to 1 %"
     )

@@ -6,13 +6,12 @@ import json
 import os
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, NoReturn
 
 from crosscheck2d.adapters.engines import ENGINES, OWN, row_of
-from crosscheck2d.reports.compare.pareto import ACCURACIES, said_of_cheaper
-from crosscheck2d.reports.compare.pooling import WHO, said_of_pool
+from crosscheck2d.reports.compare.accuracy import ACCURACIES, WHO, said_of_cheaper, said_of_pool
 from crosscheck2d.reports.run.arguments import checked_engines, checked_scenes, opening
 from crosscheck2d.reports.run.cells import about
 from crosscheck2d.reports.run.made import digest_of
@@ -22,7 +21,7 @@ from crosscheck2d.reports.speed.budget import explained_share
 from crosscheck2d.reports.speed.measure import Kept, Measuring
 from crosscheck2d.reports.speed.page import NEVER, NOT_REACHED, cost_of, write_page
 from crosscheck2d.reports.speed.plan import FULL, QUICK, SpeedPlan
-from crosscheck2d.reports.speed.results import Results
+from crosscheck2d.reports.speed.tables import Results
 from crosscheck2d.reports.terminal.console import Console, print_list, print_table, print_texts
 from crosscheck2d.reports.terminal.exits import DONE, FAILED, keeping, say
 from crosscheck2d.reports.terminal.progress import Progress
@@ -45,15 +44,8 @@ def run_speed(
     effort = FULL if full else QUICK
     # without named scenes: all scenes of the effort, the sizes and the options
     named = checked_scenes(scenes, [], False, seed)
-    effort = replace(effort, scenes=tuple(named)) if named else effort
-    plan = SpeedPlan(
-        effort.scenes,
-        checked_engines(engines, ENGINES),
-        effort,
-        seed,
-        os.cpu_count() or 1,
-        whole=not named,
-    )
+    effort = effort.of_scenes(named) if named else effort
+    plan = SpeedPlan(effort, checked_engines(engines, ENGINES), seed, os.cpu_count() or 1)
     header = about(command, seed)
     with opening(out, SPEED, fresh) as store:
         kept = kept_of(plan, header, store)
@@ -80,15 +72,9 @@ def run_speed(
 
 
 def kept_of(plan: SpeedPlan, header: Mapping[str, Any], store: Store) -> Kept:
-    files = {scene: digest_of(scene) for scene in plan.scenes if scene.endswith(".toml")}
+    files = {scene: digest_of(scene) for scene in plan.effort.scenes if scene.endswith(".toml")}
     files |= {name: row_of(name).source for name in plan.engines if name.endswith(OWN)}
-    asked = {
-        "scenes": plan.scenes,
-        "files": files,
-        "engines": plan.engines,
-        "effort": asdict(plan.effort),
-        "whole": plan.whole,
-    }
+    asked = {"files": files, "engines": plan.engines, "effort": asdict(plan.effort)}
     return Kept(store, asked | {key: header[key] for key in ("seed", "versions", "machine")})
 
 
@@ -97,7 +83,7 @@ def write_all(store: Store, results: Results, header: Mapping[str, Any]) -> None
     store.export(MACHINE, json.dumps(header, indent=1) + "\n")
     for name, table in results.files.items():
         store.export(name, table.to_csv(index=False))
-    if results.plan.whole:
+    if results.plan.effort.sizes:
         with store.exporting(FIGURES) as path:
             figures.write(path, results, header)
     with store.exporting(PAGE) as path:
@@ -106,7 +92,7 @@ def write_all(store: Store, results: Results, header: Mapping[str, Any]) -> None
 
 def print_summary(results: Results, page: str) -> None:
     console = Console()
-    scenes = len(results.scenes)
+    scenes = len(results.asks)
     rows = [
         [f"{engine}:{profile}", *map(cost_of, group.to_dict("records"))]
         for (engine, profile), group in results.pooled_reached.groupby(WHO, sort=False)

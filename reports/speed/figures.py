@@ -12,10 +12,8 @@ import numpy as np
 import pandas as pd
 
 from crosscheck2d.adapters.engines import DISTINCT, ENGINES
-from crosscheck2d.reports.compare.pareto import YARDSTICK
-from crosscheck2d.reports.compare.pooling import WHO
-from crosscheck2d.reports.speed.results import Results
-from crosscheck2d.reports.speed.tables import names_of
+from crosscheck2d.reports.compare.accuracy import WHO, YARDSTICK
+from crosscheck2d.reports.speed.tables import Results, names_of
 from crosscheck2d.reports.terminal.foreign_text import put_text
 
 KEPT = Path(__file__).parent / "figures.csv"
@@ -85,7 +83,7 @@ def write(path: Path, results: Results, header: Mapping[str, Any]) -> None:
         **header["versions"],
         "busy cores": f"{header['load']:.2f}",
         "an engine against itself": (f"{noise.median:.3f} ({noise.low:.3f} to {noise.high:.3f})"),
-        "scenes": len(results.scenes),
+        "scenes": len(results.asks),
     }
     lines = "".join(f"# {key}: {value}\n" for key, value in about.items())
     table = figures(results).to_csv(index=False, float_format="%.4g")

@@ -21,7 +21,7 @@ from crosscheck2d.reports.run.scenes import open_scene
 from crosscheck2d.reports.run.stepping import Make, overheads, step_through
 from crosscheck2d.reports.run.timing import Sample, Timed, interleaved
 from crosscheck2d.reports.run.timing_pass import can
-from crosscheck2d.scenarios.model import Array, Collisions, Scenario, Scene, Trajectory
+from crosscheck2d.scenarios.model import Array, Collisions, Scenario, Trajectory
 from crosscheck2d.scenarios.no_truth import NoTruth
 
 STARTS = 20  # of a run, evenly spread over a step
@@ -52,12 +52,13 @@ def scored(scene: str, seed: int) -> Scored:
     return Scored(replace(scenario, duration=(len(truth) - 1) * scenario.sample_interval), truth)
 
 
-def reach_of(scene: str, seed: int) -> tuple[int, str]:
-    # sample intervals with an exact answer, or why there are none
+def reason_of(scene: str, seed: int) -> str:
+    # why there is no exact answer, "" where there is one
     try:
-        return scored(scene, seed).scenario.intervals, ""
+        scored(scene, seed)
     except NoTruth as refusal:
-        return 0, str(refusal)
+        return str(refusal)
+    return ""
 
 
 def starts_within_a_step(scene: str, seed: int, dt: float) -> Iterator[tuple[float, Scored]]:
@@ -90,15 +91,9 @@ def starts_within_a_step(scene: str, seed: int, dt: float) -> Iterator[tuple[flo
 def later(answer: Callable[[Array], Trajectory], begin: float, times: Array) -> Trajectory:
     truth = answer(times + begin)
     after = truth.collisions.t > begin
-    t, i, j, impulse = (
-        getattr(truth.collisions, name)[after] for name in ("t", "i", "j", "impulse")
-    )
-    return replace(
-        truth,
-        t=truth.t - begin,
-        collisions=Collisions(t - begin, i, j, impulse),
-        horizon=truth.horizon - begin,
-    )
+    kept = {name: array[after] for name, array in vars(truth.collisions).items()}
+    collisions = Collisions(**kept | {"t": kept["t"] - begin})
+    return replace(truth, t=truth.t - begin, collisions=collisions, horizon=truth.horizon - begin)
 
 
 class Purpose(NamedTuple):
@@ -113,32 +108,26 @@ def of_trajectory(view: View) -> float:
 def of_energy(view: View) -> float:
     # against the law where energy is conserved, else against the exact answer
     alone = View(view.scenario, view.dt, view.played, rounding=view.rounding)
-    found = (METRICS["energy_error"].of(each) for each in (alone, view))
-    return next((float(value.value) for value in found if value is not None), nan)
+    errors = (METRICS["energy_error"].of(judged) for judged in (alone, view))
+    return next((float(error.value) for error in errors if error is not None), nan)
 
 
 def of_statistics(view: View) -> float:
     # three averages over time and moving disks: kinetic energy and height against gravity, over the
     # energy at hand; distance from the start, over the true one
     assert view.other is not None
-    scenario = view.scenario
-    scale = scales.energy(scenario) or 1.0
-    (kinetic, potential, way), (true_kinetic, true_potential, true_way) = (
-        averages(each, scenario.scene) for each in (view.played, view.other)
-    )
+    scene = view.scenario.scene
+    averages = []
+    for trajectory in (view.played, view.other):
+        motion = laws.kinetic_energy(trajectory, scene)
+        height = laws.energy(trajectory, scene) - motion
+        way = laws.lengths(laws.nearer_way(trajectory.position - trajectory.position[0], scene))
+        far = float(way[:, ~scene.static].mean()) if not scene.static.all() else 0.0
+        averages.append((float(motion.mean()), float(height.mean()), far))
+    (kinetic, potential, way_on), (true_kinetic, true_potential, true_way) = averages
+    scale = scales.energy(view.scenario) or 1.0
     off = max(abs(kinetic - true_kinetic), abs(potential - true_potential)) / scale
-    return max(off, abs(way - true_way) / true_way if true_way else 0.0)
-
-
-def averages(trajectory: Trajectory, scene: Scene) -> tuple[float, float, float]:
-    # kinetic and potential energy of all disks, J; mean distance from the start, m
-    kinetic = laws.kinetic_energy(trajectory, scene)
-    way = laws.lengths(laws.nearer_way(trajectory.position - trajectory.position[0], scene))
-    return (
-        float(kinetic.mean()),
-        float((laws.energy(trajectory, scene) - kinetic).mean()),
-        float(way[:, ~scene.static].mean()) if not scene.static.all() else 0.0,
-    )
+    return max(off, abs(way_on - true_way) / true_way if true_way else 0.0)
 
 
 PURPOSES: dict[str, Purpose] = {
@@ -192,20 +181,11 @@ def error_row(
     # a row as it is where the run failed
     scenario = scored(scene, seed).scenario
     engine, profile = name.split(":")
-    return {
-        "scenario": scenario.name,
-        "seed": seed,
-        "engine": engine,
-        "profile": profile,
-        "dt_s": scenario.dt(substeps),
-        "substeps": substeps,
-        "status": status,
-        "reason": reason,
-        "until_s": scenario.duration,
-        "duration_s": open_scene(scene, seed).duration,
-        "error_radii": np.inf,
-        "change_radii": np.nan,
-    }
+    row: dict[str, Any] = {"scenario": scenario.name, "seed": seed}
+    row |= {"engine": engine, "profile": profile, "dt_s": scenario.dt(substeps)}
+    row |= {"substeps": substeps, "status": status, "reason": reason}
+    row |= {"until_s": scenario.duration, "duration_s": open_scene(scene, seed).duration}
+    return row | {"error_radii": np.inf, "change_radii": np.nan}
 
 
 def times_of(

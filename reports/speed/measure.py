@@ -5,11 +5,11 @@ none."""
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from functools import partial
-from itertools import chain, groupby
+from itertools import groupby
 from math import inf, nan
 from time import perf_counter
 from typing import Any
@@ -24,15 +24,7 @@ from crosscheck2d.reports.run.scenes import open_scene
 from crosscheck2d.reports.run.store import Store
 from crosscheck2d.reports.run.timing import Sample
 from crosscheck2d.reports.speed import budget, ladder, sizes
-from crosscheck2d.reports.speed.plan import (
-    PLAIN,
-    SCENE,
-    Measurement,
-    Reach,
-    SpeedPlan,
-    estimate,
-    middle,
-)
+from crosscheck2d.reports.speed.plan import PLAIN, SCENE, Measurement, SpeedPlan, middle
 from crosscheck2d.reports.terminal.progress import Progress
 from crosscheck2d.scenarios.truth.exact import CLOSED_FORM, answered_by
 
@@ -40,9 +32,9 @@ from crosscheck2d.scenarios.truth.exact import CLOSED_FORM, answered_by
 HANGS, ALL_ROUNDS = 600.0, 3600.0
 SIZE, WORST_STEP, IN_PILE, TRUTH = "size", "worst step", "pile", "truth"
 SLEEPING = "sleeping"  # the option of engines that may let disks sleep
-WORDS = ("kind", "engine", "profile", "scenario", "change")
 NUMBERS = {"dt_s": float, "n": int, "copy_of": int, "round": int, "place": int}
 NUMBERS |= {"cost": float, "wrapping": float, "runs": int}
+COLUMNS = ["kind", "engine", "profile", "scenario", "change", *NUMBERS]  # of samples
 SOURCE = ("reports/speed/*.py", "reports/compare/*.py", "reports/run/*.py", "scenarios/**/*.py")
 TASK = "measurement"  # the kind of the rows in the store
 TRUTH_RUNS = 20  # of a closed form
@@ -81,7 +73,7 @@ def now() -> str:
 
 
 def samples_table(rows: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
-    return pd.DataFrame(rows, columns=[*WORDS, *NUMBERS]).astype(NUMBERS)
+    return pd.DataFrame(rows, columns=COLUMNS).astype(NUMBERS)
 
 
 @dataclass
@@ -114,32 +106,28 @@ class Measuring:
     measured: Measured = field(default_factory=Measured)
 
     def run(self) -> Measured:
-        reach = self.find_reach()
-        measurements = list(self.plan.measurements(reach))
+        # in workers, which can be stopped at any time
+        tasks = {seeded: partial(ladder.reason_of, *seeded) for seeded in self.plan.seeded_scenes}
+        reasons = do_all(tasks, self.plan.workers, self.progress, "exact answer")
+        for (scene, seed), reason in reasons.items():
+            if reason:
+                reason = reason.reason if isinstance(reason, Failure) else reason
+                left_out = f"{scene}, seed {seed}", f"no exact answer: {reason}"
+                self.measured.left_out.append(left_out)
+        answered = [seeded for seeded, reason in reasons.items() if not reason]
+        measurements = list(self.plan.measurements(answered))
         if any(measurement.kind == SCENE for measurement in measurements):
-            self.progress.note(estimate(self.plan, measurements, reach))
             played = self.measure_errors(measurements)
-            self.measure_budget(reach)
+            self.measure_budget([scene for scene, seed in answered if seed == self.plan.seed])
             self.measure_times(played)
         return self.measured
-
-    def find_reach(self) -> Reach:
-        # in workers, which can be stopped at any time
-        tasks = {seeded: partial(ladder.reach_of, *seeded) for seeded in self.plan.seeded_scenes}
-        reach = {}
-        for seeded, result in done(tasks, self.plan.workers, self.progress, "exact answer"):
-            reach[seeded], reason = (0, result.reason) if isinstance(result, Failure) else result
-            if reason:
-                what = "{}, seed {}".format(*seeded)
-                self.measured.left_out.append((what, f"no exact answer: {reason}"))
-        return reach
 
     def measure_errors(self, measurements: Sequence[Measurement]) -> list[Measurement]:
         """The errors of all engines; returns those of the first seed at the steps that were played
         to the end."""
         workers = self.plan.workers
         tasks = {measurement.task: measurement.errors for measurement in measurements}
-        results = dict(done(tasks, workers, self.progress, "error", kept=self.kept))
+        results = do_all(tasks, workers, self.progress, "error", kept=self.kept)
         rows: list[dict[str, Any]] = []
         played = []
         for measurement in measurements:
@@ -154,31 +142,27 @@ class Measuring:
         self.measured.errors = pd.DataFrame(rows)
         return played
 
-    def measure_budget(self, reach: Reach) -> None:
-        seed = self.plan.seed
+    def measure_budget(self, answered: Sequence[str]) -> None:
         tasks = {
-            ("budget", scene, name): partial(budget.budget_of, scene, seed, name, middle(scene))
-            for scene in self.plan.budget_scenes
+            ("budget", scene, name): partial(
+                budget.budget_of, scene, self.plan.seed, name, middle(scene)
+            )
+            for scene in self.plan.effort.budget_scenes
             for name in self.plan.engines
-            if name in MECHANISMS and reach[scene, seed]
+            if name in MECHANISMS and scene in answered
         }
-        results = dict(
-            done(tasks, self.plan.workers, self.progress, "error budget", kept=self.kept)
-        )
-        self.leave_out("error budget", results)
-        rows = [results[task] for task in tasks if not isinstance(results[task], Failure)]
-        self.measured.budget = pd.DataFrame(chain.from_iterable(rows), columns=budget.COLUMNS)
+        results = do_all(tasks, self.plan.workers, self.progress, "error budget", kept=self.kept)
+        ended = self.without_failures("error budget", results)
+        rows = [row for task in tasks for row in ended.get(task, ())]
+        self.measured.budget = pd.DataFrame(rows, columns=budget.COLUMNS)
 
     def measure_times(self, played: Sequence[Measurement]) -> None:
         self.measured.busy = busy_cores()
         tasks = timings(self.plan, played)
-        results = dict(done(tasks, 1, self.progress, "time", ALL_ROUNDS, self.kept))
-        self.leave_out("timing", results)
+        results = do_all(tasks, 1, self.progress, "time", ALL_ROUNDS, self.kept)
         rows: list[dict[str, Any]] = []
         truths = []
-        for (_, kind, *_), result in results.items():
-            if isinstance(result, Failure):
-                continue
+        for (_, kind, *_), result in self.without_failures("timing", results).items():
             if kind == TRUTH:
                 truths.append(result)
             elif kind == SIZE:
@@ -189,19 +173,21 @@ class Measuring:
         self.measured.samples = samples_table(rows)
         self.measured.truths = pd.DataFrame(truths)
 
-    def leave_out(self, what: str, results: Mapping[tuple[Any, ...], Any]) -> None:
+    def without_failures(self, what: str, results: Mapping[Any, Any]) -> dict[Any, Any]:
         for task, result in results.items():
             if isinstance(result, Failure):
                 reason = f"{result.status}: {result.reason}"
                 self.measured.left_out.append((f"{what} of {' '.join(task[1:])}", reason))
+        return {task: x for task, x in results.items() if not isinstance(x, Failure)}
 
 
 def one_step_size_at_a_time(measurement: Measurement, workers: int) -> list[dict[str, Any]]:
     """A ladder whose worker died or hung, played again one step size at a time, so that the
     other step sizes are kept."""
     rows: list[dict[str, Any]] = []
-    alone = [measurement._replace(step_sizes=(k,)) for k in measurement.step_sizes]
-    for k, result in run_all({one.step_sizes[0]: one.errors for one in alone}, workers, HANGS):
+    steps = measurement.step_sizes
+    alone: dict[Hashable, Any] = {k: measurement._replace(step_sizes=(k,)).errors for k in steps}
+    for k, result in run_all(alone, workers, HANGS):
         if isinstance(result, Failure):
             where = measurement.scene, measurement.seed, measurement.name, k
             result = [ladder.error_row(*where, result.status, result.reason)]
@@ -227,7 +213,7 @@ def timings(
         tasks["time", kind, scene] = partial(scene_rows, kind, scene, plan.seed, engines, repeats)
         if kind == SCENE:
             tasks["time", TRUTH, scene] = partial(closed_form, scene, plan.seed)
-    if plan.whole:
+    if plan.effort.sizes:
         tasks["time", SIZE] = partial(size_rows, plan, repeats)
     return tasks
 
@@ -274,10 +260,7 @@ def size_rows(plan: SpeedPlan, repeats: Mapping[str, Any]) -> dict[str, list[Any
         sample_row(IN_PILE, sample.key[0], sample, n=sizes.PILE, change=sample.key[1])
         for sample in sizes.pile_costs(piles, seed=plan.seed, **repeats)
     ]
-    return {
-        "samples": rows,
-        "stopped": [(name, n, reason) for (name, n), reason in stopped.items()],
-    }
+    return {"samples": rows, "stopped": [(*key, reason) for key, reason in stopped.items()]}
 
 
 def sample_row(kind: str, name: str, sample: Sample, **identity: Any) -> dict[str, Any]:
@@ -304,26 +287,25 @@ def closed_form(scene: str, seed: int) -> dict[str, Any]:
     return {"scenario": scenario.name, "truth": model, "closed_us": cost}
 
 
-def done(
-    tasks: Mapping[Any, Any],
+def do_all(
+    tasks: Mapping[Any, Callable[[], Any]],
     workers: int,
     progress: Progress,
     what: str,
     patience: float = HANGS,
     kept: Kept | None = None,
-) -> Iterable[tuple[Any, Any]]:
-    """Run the tasks with progress; yields the kept results first, then new ones as they come."""
-    known = {} if kept is None else {task: kept.get(task) for task in tasks}
-    known = {task: result for task, result in known.items() if result is not None}
-    yield from known.items()
-    left = {task: do for task, do in tasks.items() if task not in known}
-    if not left:
-        return
-    progress.start(len(left), len(tasks), what)
-    for task, result in run_all(left, workers, patience):
+) -> dict[Any, Any]:
+    """Task -> its result or `Failure`, the kept ones first, then new ones as they come."""
+    known: dict[Hashable, Any] = {task: kept.get(task) for task in tasks} if kept else {}
+    results = {task: result for task, result in known.items() if result is not None}
+    missing = {task: do for task, do in tasks.items() if task not in results}
+    if missing:
+        progress.start(len(missing), len(tasks), what)
+    for task, result in run_all(missing, workers, patience) if missing else ():
         failed = isinstance(result, Failure)
         if kept is not None and not failed:
             kept.add(task, result)
         label = " ".join(str(part) for part in task if part not in (what, PLAIN))
         progress.done(f"{what}: {label}", *(result[:2] if failed else ("ok", "")))
-        yield task, result
+        results[task] = result
+    return results

@@ -8,7 +8,7 @@ from time import perf_counter
 import numpy as np
 
 from crosscheck2d.adapters.engine import Engine, Unsupported
-from crosscheck2d.reports.compare.order import line_interval
+from crosscheck2d.reports.compare.accuracy import line_interval
 from crosscheck2d.reports.run.stepping import Spent
 from crosscheck2d.reports.run.timing import Sample, Timed, interleaved
 from crosscheck2d.scenarios.families.placing import box, lay_out

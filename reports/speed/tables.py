@@ -1,5 +1,4 @@
-"""The tables made from samples and errors: points, orders, cost of an accuracy, sizes, options,
-sweeps, our own solver beside the others, the cheapest model, noise floor."""
+"""The tables of a measurement, made from its samples and errors, for the page and for the files."""
 
 from __future__ import annotations
 
@@ -12,23 +11,30 @@ import pandas as pd
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.adapters.mechanisms.options import SWEEPS
 from crosscheck2d.adapters.mechanisms.table import MECHANISMS
-from crosscheck2d.reports.compare.order import FINEST, Order, median_interval, order_of
-from crosscheck2d.reports.compare.pareto import (
+from crosscheck2d.reports.compare.accuracy import (
     ACCURACIES,
     FAILED,
+    FINEST,
     NOT_REACHED,
     NOT_TIMED,
+    POOLED,
     UNREACHABLE,
+    WHO,
     YARDSTICK,
+    Order,
     cost_to_reach,
+    median_interval,
+    order_of,
     paired_cost,
+    pooled,
     yardstick_of,
 )
-from crosscheck2d.reports.compare.pooling import POOLED, WHO, pooled
+from crosscheck2d.reports.run.scenes import open_scene
 from crosscheck2d.reports.run.stepping import CALL, EMPTY, READ, binding_of
-from crosscheck2d.reports.run.timing import WARM_UP
+from crosscheck2d.reports.run.timing import WARM_UP, Noise, noise_of
+from crosscheck2d.reports.speed import budget
 from crosscheck2d.reports.speed.measure import IN_PILE, SIZE, SLEEPING, WORST_STEP, Measured
-from crosscheck2d.reports.speed.plan import OPTION, PLAIN, SCENE, SWEEP
+from crosscheck2d.reports.speed.plan import OPTION, PLAIN, SCENE, SWEEP, SpeedPlan
 from crosscheck2d.reports.speed.sizes import exponent
 from crosscheck2d.reports.terminal.counts import listed
 from crosscheck2d.scenarios.model import Scenario
@@ -37,6 +43,7 @@ from crosscheck2d.scenarios.truth.exact import CLOSED_FORM
 NOT_GOT = {"never": UNREACHABLE, "failed": FAILED, "untimed": NOT_TIMED}  # how it is counted -> why
 TIMES = ["cost", "low", "high", "best", "wrapping"]
 HERE = ["scenario", *WHO]
+QUIET = 0.05  # how far from 1 the middle half of an engine against itself may read
 # engines with end-of-step detection, but for our own solver
 COMPARED = tuple(name for name in MECHANISMS if name in ENGINES and name != YARDSTICK)
 
@@ -60,9 +67,9 @@ def summed_up(samples: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
     rounds; no warm-up."""
     counted = samples[samples["round"] != WARM_UP].groupby(list(by), sort=False)
     cost = counted["cost"]
-    quartiles = {"low": cost.quantile(0.25), "high": cost.quantile(0.75)}
-    table = pd.DataFrame({"cost": cost.median(), **quartiles, "best": cost.min()})
-    return table.assign(wrapping=counted["wrapping"].median(), rounds=cost.size()).reset_index()
+    columns = {"cost": cost.median(), "low": cost.quantile(0.25), "high": cost.quantile(0.75)}
+    columns |= {"best": cost.min(), "wrapping": counted["wrapping"].median(), "rounds": cost.size()}
+    return pd.DataFrame(columns).reset_index()
 
 
 def times_in_us(samples: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
@@ -127,50 +134,38 @@ def sweeps(measured: Measured, seed: int) -> pd.DataFrame:
     if not (measured.errors.kind == SWEEP).any():
         return pd.DataFrame()
     table = summed(measured, SWEEP, seed)
-    places = {
+    values = {
         (sweep.name, str(value)): k
         for sweep in SWEEPS
         for k, value in enumerate(sweep.parameter.values)
     }
-    places_of_rows = [places.get(key, -1) for key in zip(names_of(table), table.change)]
-    step_size = np.where(table.change == PLAIN, doublings(table), places_of_rows)
+    places = [values.get(key, -1) for key in zip(names_of(table), table.change)]
+    step_size = np.where(table.change == PLAIN, doublings(table), places)
     return table.assign(step_size=step_size, idle=np.nan)
 
 
-def pooled_sweeps(table: pd.DataFrame) -> pd.DataFrame:
+def pooled_sweeps(table: pd.DataFrame) -> tuple[pd.DataFrame, list[tuple[str, str]]]:
     """As `pooled`, of cost and error over those of the matched engine at the dt at which its
-    parameter is swept.
+    parameter is swept; and the (engine, scenario) that have no part in it, because the matched
+    engine failed there, was not timed, or is right to the last bit.
 
-    change is the value of the sweep; a ladder of dt has none. Scenes of `without_ratio` have no
-    part in it.
+    change is the value of the sweep; a ladder of dt has none.
     """
     if table.empty:
-        return table
-    matched = at_matched(table)
-    both = table.merge(matched[matched.usable], on=["scenario", "engine"])
+        return table, []
+    dt = table[table.change != PLAIN].groupby("scenario").dt_s.first()
+    matched = table[(table.change == PLAIN) & (table.dt_s == table.scenario.map(dt))]
+    usable = np.isfinite(matched.cost) & np.isfinite(matched.error) & (matched.error > 0)
+    here = matched[usable][["scenario", "engine", "cost", "error"]]
+    both = table.merge(here, on=["scenario", "engine"], suffixes=("", "_here"))
     both = both.assign(cost=both.cost / both.cost_here, error=both.error / both.error_here)
     parts = [
         pooled(group).assign(change=str(change))
         for (_, change), group in both.groupby(["profile", "change"])
     ]
-    return pd.concat(parts).sort_values("step_size", kind="stable") if parts else table.head(0)
-
-
-def without_ratio(table: pd.DataFrame) -> list[tuple[str, str]]:
-    """(engine, scenario) of the sweeps where the matched engine failed, was not timed, or is right
-    to the last bit."""
-    matched = at_matched(table)
-    return list(matched[~matched.usable][["engine", "scenario"]].itertuples(index=False, name=None))
-
-
-def at_matched(table: pd.DataFrame) -> pd.DataFrame:
-    """scenario, engine, cost_here and error_here: each matched engine at the dt at which its
-    parameter is swept; usable: there is a value to divide by."""
-    dt = table[table.change != PLAIN].groupby("scenario").dt_s.first()
-    here = table[(table.change == PLAIN) & (table.dt_s == table.scenario.map(dt))]
-    usable = np.isfinite(here.cost) & np.isfinite(here.error) & (here.error > 0)
-    both = here[["scenario", "engine", "cost", "error"]].assign(usable=usable)
-    return both.rename(columns={"cost": "cost_here", "error": "error_here"})
+    pool = pd.concat(parts).sort_values("step_size", kind="stable") if parts else table.head(0)
+    without_ratio = matched[~usable][["engine", "scenario"]]
+    return pool, list(without_ratio.itertuples(index=False, name=None))
 
 
 def orders(measured: Measured, seed: int) -> pd.DataFrame:
@@ -251,11 +246,9 @@ def pooled_reached(part: pd.DataFrame, found: pd.DataFrame) -> pd.DataFrame:
 
 def noise(measured: Measured) -> pd.DataFrame:
     samples = measured.samples[measured.samples.kind == SCENE]
-    both = (
-        summed_up(samples, [*HERE, "dt_s", "copy_of"])
-        .pivot(index=[*HERE, "dt_s"], columns="copy_of", values="cost")
-        .reindex(columns=[0, 1])
-    )
+    costs = summed_up(samples, [*HERE, "dt_s", "copy_of"])
+    both = costs.pivot(index=[*HERE, "dt_s"], columns="copy_of", values="cost")
+    both = both.reindex(columns=[0, 1])
     return (both[1] / both[0]).dropna().rename("ratio").reset_index()
 
 
@@ -386,8 +379,8 @@ def against_own(points: pd.DataFrame, options: pd.DataFrame) -> pd.DataFrame:
         ratios = logs.groupby("scenario", sort=False)["log"].mean()
         timed = np.exp(ratios.dropna())
         bare = (group.cost - group.idle) - (group.own - group.own_idle)
-        bare = (bare * group.get("dt_s", np.nan)).groupby(group.scenario, sort=False).mean()
-        bare = bare.dropna()
+        bare = bare * group.get("dt_s", np.nan)
+        bare = bare.groupby(group.scenario, sort=False).mean().dropna()
         cheaper, bare_cheaper = timed[timed < 1].index, bare[bare < 0].index
         return {
             "scenes": len(timed),
@@ -429,3 +422,78 @@ def cheapest_models(truths: pd.DataFrame, points: pd.DataFrame) -> pd.DataFrame:
         row |= {"model": model, "engine": engine, "cost_us": cost}
         rows.append(row | {"loose_engine": loose_engine, "loose_us": loose_cost})
     return pd.DataFrame(rows)
+
+
+class Results:
+    """What was measured, which must be an error at least, and the tables made from it.
+
+    Attributes, beside the tables that a function of this module of the same name describes:
+        asks: scenario -> its question, for the measured scenarios in the order in which they were
+            asked for.
+        points: as of `points`; and idle, what as many steps cost where there is nothing to do, µs
+            per simulated s.
+        pooled: see `pooling.pooled`; of scenes without friction, as is `pooled_reached`, unless
+            every scene has friction.
+        versus, models, explained: see `against_own`, `cheapest_models`, `budget.explain`.
+    """
+
+    def __init__(self, plan: SpeedPlan, measured: Measured) -> None:
+        self.plan, self.measured, seed = plan, measured, plan.seed
+        scenarios = {s.name: s for s in (open_scene(scene, seed) for scene in plan.effort.scenes)}
+        self.bindings = bindings(measured)
+        self.driving = driving(self.bindings)
+        self.points = points(measured, seed)
+        self.points["idle"] = idle(self.bindings, self.points, scenarios)
+        played = {*self.points.scenario}
+        self.asks = {name: s.asks for name, s in scenarios.items() if name in played}
+        self.orders = orders(measured, seed)
+        self.reached = reached(self.points, self.orders)
+        rough = {name for name, scenario in scenarios.items() if scenario.scene.friction}
+        rough = set() if rough >= played else rough
+        self.pooled = pooled(self.points[~self.points.scenario.isin(rough)])
+        smooth = self.reached[~self.reached.scenario.isin(rough)]
+        self.pooled_reached = pooled_reached(smooth, self.reached)
+        self.sizes = sizes(measured)
+        self.growth = growth(self.sizes, measured.stopped)
+        self.pile = pile(measured)
+        self.sweeps = sweeps(measured, seed)
+        self.options = options(measured)
+        self.versus = against_own(self.points, self.options)
+        self.models = cheapest_models(measured.truths, self.points)
+        self.explained = budget.explain(measured.budget)
+        self.noise = noise(measured)
+
+    @property
+    def files(self) -> dict[str, pd.DataFrame]:
+        own = "pooled orders reached sizes pile options driving bindings noise models sweeps"
+        tables = {name: getattr(self, name) for name in (*own.split(), "explained", "versus")}
+        measured = {name: getattr(self.measured, name) for name in ("samples", "errors", "budget")}
+        named = {f"speed_{name}.csv": table for name, table in (tables | measured).items()}
+        return {"speed.csv": self.points} | named
+
+    def noise_floor(self, scene: str = "") -> Noise:
+        # of an engine against itself, in one scene or in all
+        ratios = self.noise[self.noise.scenario == scene].ratio if scene else self.noise.ratio
+        return noise_of(ratios.to_numpy(float))
+
+    @property
+    def noise_sentence(self) -> str:
+        noise = self.noise_floor()
+        if not noise.pairs:
+            return "No engine was timed against itself, so the noise floor is not known."
+        sentence = (
+            "Noise floor: the time of an engine over its own time again, in the same rounds, is"
+            f" {noise.median:.3f}"
+        )
+        if noise.pairs > 1:
+            sentence += (
+                f"; for half of {noise.pairs} pairs it is from {noise.low:.3f} to"
+                f" {noise.high:.3f}, at worst {noise.least:.3f} and {noise.most:.3f}"
+            )
+        if noise.floor <= QUIET:
+            return f"{sentence}."
+        return (
+            f"{sentence}. It must stay between {1 - QUIET:g} and {1 + QUIET:g}: differences of time"
+            " below this floor mean nothing. Measure again while nothing else runs before you quote"
+            " a time."
+        )

@@ -22,10 +22,10 @@ from crosscheck2d.reports.page.kit import (
     Table,
     TableCell,
     Text,
+    neighbours,
     render_page,
     run_section,
 )
-from crosscheck2d.reports.page.links import neighbours
 from crosscheck2d.reports.page.style import TRUTH, number
 from crosscheck2d.reports.stability.cases import FAMILY_OF, OWN_SCENE, case_named
 from crosscheck2d.reports.stability.limits import (

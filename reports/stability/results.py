@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
 from crosscheck2d.adapters.engine_row import EngineRow
-from crosscheck2d.adapters.engines import ENGINES, FETCHED, OWN, parsed
+from crosscheck2d.adapters.engines import ENGINES, FETCHED, NAMED, OWN, parsed
 from crosscheck2d.adapters.npm_packages import version_of
 from crosscheck2d.reports.page.replay import COLLISIONS, Layers, pack_layers, ratio_of
 from crosscheck2d.reports.run.cells import about, content_key, source_hash
@@ -126,7 +126,7 @@ class StabilityPlan:
         return {
             name: ENGINES[name]
             for name in self.engines
-            if name.endswith(OWN) or name in FETCHED or parsed(name)[1]
+            if name.endswith(OWN) or name in FETCHED | NAMED or parsed(name)[1]
         }
 
     @property

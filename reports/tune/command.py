@@ -147,7 +147,7 @@ class SettingsTrial(NamedTuple):
 @dataclass
 class SettingsSearch:
     engine: str
-    families: tuple[str, ...] = tuple(each.__name__ for each in FAMILIES)
+    families: tuple[str, ...] = tuple(FAMILIES)
     seeds: tuple[int, ...] = SEEDS
     say: Callable[[str], None] = print
     known: dict[tuple[Any, ...], TrialScores] = field(default_factory=dict)

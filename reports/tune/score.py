@@ -96,9 +96,7 @@ class Against(NamedTuple):
 def posed(families: tuple[str, ...], seeds: tuple[int, ...]) -> tuple[Asked, ...]:
     """The tuning scenes with their exact answers, which are cut at their horizons; family by
     family."""
-    scenes = [
-        one_of(each, seed) for each in FAMILIES if each.__name__ in families for seed in seeds
-    ]
+    scenes = [one_of(name, seed) for name in FAMILIES if name in families for seed in seeds]
     return tuple((scene, scene.truth(scene.times) if scene.truth else None) for scene in scenes)
 
 

@@ -62,4 +62,4 @@ def gas_of_100(seed: int = 0) -> Scenario:
     return with_oracle(question)
 
 
-CROWDS = (simbenchmark_bouncing, gas_of_100)
+CROWDS = (simbenchmark_bouncing(), gas_of_100())

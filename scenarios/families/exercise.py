@@ -81,7 +81,7 @@ def ship_thrust() -> Scenario:
     )
 
 
-EXERCISE = (ship_thrust, asteroids)
+EXERCISE = (ship_thrust(), asteroids())
 
 
 def spin_under_torque() -> Scenario:
@@ -141,4 +141,4 @@ def body_frame_thrust() -> Scenario:
     )
 
 
-THRUSTS = (spin_under_torque, body_frame_thrust)
+THRUSTS = (spin_under_torque(), body_frame_thrust())

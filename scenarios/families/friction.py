@@ -3,9 +3,6 @@ collisions of spinning disks."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
-
 import numpy as np
 
 from crosscheck2d.scenarios.families.placing import box, lay_out, scatter, tag
@@ -160,26 +157,6 @@ def slide_on_floor(
     return Scenario(name, asks, ROLL, scene, duration, truth=truth)
 
 
-def slip_to_roll() -> Scenario:
-    return slide_on_floor(
-        "slip_to_roll",
-        "Does a disk that slides begin to roll at 2/3 of its speed, after v / (3 mu g)?",
-        speed=3.0,
-        spin=0.0,
-        duration=1.5,
-    )
-
-
-def backspin_returns() -> Scenario:
-    return slide_on_floor(
-        "backspin_returns",
-        "Does a disk with back spin stop, come back and roll at the right time?",
-        speed=1.5,
-        spin=30.0,
-        duration=3.0,
-    )
-
-
 # Right triangles in whole numbers a, b, c: the slope is a / b, and with these scales a disk of
 # radius c * scale touches its incline exactly in float64.
 SLOPES = (
@@ -276,12 +253,24 @@ def turning_answer(
     return answer(scene, t, (place[..., :2], rate[..., :2]), collisions, turning)
 
 
-FRICTION: tuple[Callable[..., Scenario], ...] = (
-    *(partial(friction_bounce, e, mu) for mu in (0.1, 0.5) for e in (0.0, 0.5, 1.0)),
-    spinning_disks_meet,
-    spin_to_flight_and_back,
-    slip_to_roll,
-    backspin_returns,
-    roll_or_slide,
-    frictional_box,
+FRICTION = (
+    *(friction_bounce(e, mu) for mu in (0.1, 0.5) for e in (0.0, 0.5, 1.0)),
+    spinning_disks_meet(),
+    spin_to_flight_and_back(),
+    slide_on_floor(
+        "slip_to_roll",
+        "Does a disk that slides begin to roll at 2/3 of its speed, after v / (3 mu g)?",
+        speed=3.0,
+        spin=0.0,
+        duration=1.5,
+    ),
+    slide_on_floor(
+        "backspin_returns",
+        "Does a disk with back spin stop, come back and roll at the right time?",
+        speed=1.5,
+        spin=30.0,
+        duration=3.0,
+    ),
+    roll_or_slide(),
+    frictional_box(),
 )

@@ -3,8 +3,6 @@ disks."""
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 
 from crosscheck2d.scenarios.families.placing import box, lay_out, scatter
@@ -92,4 +90,4 @@ def falling_box(seed: int = 0) -> Scenario:
     return with_oracle(question)
 
 
-LESSON = (free_fall, partial(free_fall, spin=0.0), ping_pong, falling_box)
+LESSON = (free_fall(), free_fall(spin=0.0), ping_pong(), falling_box())

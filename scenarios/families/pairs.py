@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,7 +17,7 @@ SOURCE = (
 RESTITUTIONS = (0.0, 0.5, 0.9, 1.0)
 
 
-def _pairs(name: str, asks: str, duration: float = 4.0, **disks: Any) -> Scenario:
+def meet(name: str, asks: str, duration: float = 4.0, **disks: Any) -> Scenario:
     """Disks 0 and 1, 2 and 3, ... meet; no pair comes near another."""
     scene = lay_out(**disks)
 
@@ -39,100 +37,76 @@ def _pairs(name: str, asks: str, duration: float = 4.0, **disks: Any) -> Scenari
     return Scenario(name, asks, SOURCE, scene, duration, truth=truth)
 
 
-def head_on_equal(restitution: float) -> Scenario:
-    return _pairs(
-        f"head_on_equal_{tag('e', restitution)}",
-        f"Do two equal disks separate after a head-on collision as e = {restitution:g} says?",
-        position=[[-1.7, 0], [1.9, 0]],
-        velocity=[[1.1, 0], [-0.7, 0]],
-        restitution=restitution,
-    )
+LANES = np.arange(7)
 
-
-def head_on_unequal(restitution: float) -> Scenario:
-    return _pairs(
-        f"head_on_unequal_{tag('e', restitution)}",
-        f"Do a light and a heavy disk share momentum in a head-on collision as e = {restitution:g}"
-        " says?",
-        position=[[-1.11, 0], [1.87, 0]],
-        velocity=[[1.3, 0], [-0.6, 0]],
-        mass=[1, 7],
-        restitution=restitution,
-    )
-
-
-def oblique(restitution: float) -> Scenario:
-    return _pairs(
-        f"oblique_{tag('e', restitution)}",
-        f"Do two disks that meet off centre separate at the angles of e = {restitution:g}, their"
-        " spin untouched?",
-        position=[[-1.8, -0.1], [1.7, 0.2]],
-        velocity=[[1.2, 0.1], [-0.7, 0.05]],
-        mass=[1, 2],
-        angular_velocity=[1.5, -0.5],
-        restitution=restitution,
-    )
-
-
-def off_centre_without_spin() -> Scenario:
-    """At 37 degrees off the line of centres, for engines without rotation: one that exchanges x and
-    y of the velocities, without a normal, is right on a line."""
-    return _pairs(
+PAIRS = (
+    *(
+        meet(
+            f"head_on_equal_{tag('e', e)}",
+            f"Do two equal disks separate after a head-on collision as e = {e:g} says?",
+            position=[[-1.7, 0], [1.9, 0]],
+            velocity=[[1.1, 0], [-0.7, 0]],
+            restitution=e,
+        )
+        for e in RESTITUTIONS
+    ),
+    *(
+        meet(
+            f"head_on_unequal_{tag('e', e)}",
+            f"Do a light and a heavy disk share momentum in a head-on collision as e = {e:g} says?",
+            position=[[-1.11, 0], [1.87, 0]],
+            velocity=[[1.3, 0], [-0.6, 0]],
+            mass=[1, 7],
+            restitution=e,
+        )
+        for e in RESTITUTIONS
+    ),
+    *(
+        meet(
+            f"oblique_{tag('e', e)}",
+            f"Do two disks that meet off centre separate at the angles of e = {e:g}, their spin"
+            " untouched?",
+            position=[[-1.8, -0.1], [1.7, 0.2]],
+            velocity=[[1.2, 0.1], [-0.7, 0.05]],
+            mass=[1, 2],
+            angular_velocity=[1.5, -0.5],
+            restitution=e,
+        )
+        for e in RESTITUTIONS
+    ),
+    # At 37 degrees off the line of centres, for engines without rotation: one that exchanges x and
+    # y of the velocities, without a normal, is right on a line.
+    meet(
         "off_centre_without_spin",
         "Do two disks that meet off centre change their velocities along the line of centres only?",
         duration=2.0,
         position=[[-1.013, 0.3], [0.5, 0.0]],
         velocity=[[2.0, 0.0], [0.0, 0.0]],
         mass=[1, 2],
-    )
-
-
-def mass_ratios() -> Scenario:
-    lanes = np.arange(7)
-    y = 2.0 * (lanes - 3)
+    ),
     # The distance grows from lane to lane, so that the seven collisions are at different phases of
     # a step.
-    light = np.stack([-1.442 - 0.0499 * lanes, y], axis=-1)
-    heavy = np.stack([1.3 + 0.0 * lanes, y], axis=-1)
-    return _pairs(
+    meet(
         "mass_ratios",
         "Up to which mass ratio does a head-on collision still keep momentum and energy?",
-        position=np.stack([light, heavy], axis=1).reshape(-1, 2),
+        position=[[x, 2.0 * (lane - 3)] for lane in LANES for x in (-1.442 - 0.0499 * lane, 1.3)],
         velocity=np.tile([[0.5, 0], [-1, 0]], (7, 1)),
-        mass=np.stack([np.ones(7), 10.0**lanes], axis=-1).ravel(),
-    )
-
-
-def slow_collision() -> Scenario:
-    """Below the threshold under which some engines make every collision inelastic."""
-    return _pairs(
+        mass=np.stack([np.ones(7), 10.0**LANES], axis=-1).ravel(),
+    ),
+    # Below the threshold under which some engines make every collision inelastic.
+    meet(
         "slow_collision",
         "Is a collision at 0.5 m/s as elastic as a fast one, or is it below a threshold?",
         position=[[-0.63, 0], [0.583, 0]],
         velocity=[[0.37, 0], [-0.13, 0]],
         restitution=0.9,
-    )
-
-
-def near_miss() -> Scenario:
-    return _pairs(
+    ),
+    meet(
         "near_miss",
         "Which engine reports a spurious collision when a fast disk passes another at 1.005 times"
         " the touching distance?",
         duration=1.0,
         position=[[-6, 1.005 * 2 * 0.25], [0.03, 0]],
         velocity=[[12, 0], [0, 0]],  # 0.2 radii per step of 1/240 s
-    )
-
-
-PAIRS: tuple[Callable[..., Scenario], ...] = (
-    *(
-        partial(build, e)
-        for build in (head_on_equal, head_on_unequal, oblique)
-        for e in RESTITUTIONS
     ),
-    off_centre_without_spin,
-    mass_ratios,
-    slow_collision,
-    near_miss,
 )

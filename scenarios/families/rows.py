@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from crosscheck2d.scenarios.families.placing import lay_out
-from crosscheck2d.scenarios.model import Array, Scenario, Trajectory
+from crosscheck2d.scenarios.model import Array, Scenario, Scene, Trajectory
 from crosscheck2d.scenarios.truth.closed_forms import Motion, answer
 from crosscheck2d.scenarios.truth.exact import with_oracle
 from crosscheck2d.scenarios.truth.lines import galperin, galperin_collisions, row, row_collisions
@@ -19,6 +19,12 @@ def _on_line(x: Array, v: Array) -> Motion:
     """(..., 2) m, m/s: positions or velocities x and v (...,) along the line y = 0."""
     zero = np.zeros_like(x)
     return np.stack([x, zero], axis=-1), np.stack([v, zero], axis=-1)
+
+
+def _row_answer(scene: Scene, length: float, t: Array) -> Trajectory:
+    x, v, radius = scene.position[:, 0], scene.velocity[:, 0], float(scene.radius[0])
+    collisions = row_collisions(x, v, radius, length, 1.0, t[-1])
+    return answer(scene, t, _on_line(*row(x, v, radius, length, t)), collisions)
 
 
 def line_gas() -> Scenario:
@@ -35,17 +41,13 @@ def line_gas() -> Scenario:
     )
     scene = lay_out(*_on_line(x, v), walls=[[[0, -1], [0, 1]], [[length, -1], [length, 1]]])
 
-    def truth(t: Array) -> Trajectory:
-        collisions = row_collisions(x, v, radius, length, 1.0, t[-1])
-        return answer(scene, t, _on_line(*row(x, v, radius, length, t)), collisions)
-
     return Scenario(
         "line_gas",
         "How does the error grow over hundreds of collisions where there is no chaos?",
         "Tonks, Phys. Rev. 50, 955 (1936); Jepsen, J. Math. Phys. 6, 405 (1965)",
         scene,
         duration=9.15,  # 278 collisions
-        truth=truth,
+        truth=partial(_row_answer, scene, length),
     )
 
 
@@ -84,62 +86,50 @@ IN_CRADLE = np.array([1.0, 1.0, 0.0, 0.0, 0.0])  # m/s: two of five disks move i
 
 
 def cradle_with_gaps() -> Scenario:
-    x, v = np.array([-2.355, -1.8447, 0.0, 0.5169, 1.0317]), IN_CRADLE
-    scene = lay_out(*_on_line(x, v))
-
-    def truth(t: Array) -> Trajectory:
-        collisions = row_collisions(x, v, 0.25, np.inf, 1.0, t[-1])
-        return answer(scene, t, _on_line(*row(x, v, 0.25, np.inf, t)), collisions)
-
+    x = np.array([-2.355, -1.8447, 0.0, 0.5169, 1.0317])
+    scene = lay_out(*_on_line(x, IN_CRADLE))
     return Scenario(
         "cradle_with_gaps",
         "Do two disks leave a cradle when two come in, if a centimetre lies between its disks?",
         "equal masses swap velocities at e = 1: they stay sorted",
         scene,
         duration=4.0,
-        truth=truth,
+        truth=partial(_row_answer, scene, np.inf),
     )
-
-
-def cradle_touching() -> Scenario:
-    # Binary fractions, so that the disks touch exactly.
-    x = np.array([-2.2587890625, -1.7587890625, 0.0, 0.5, 1.0])
-    question = Scenario(
-        "cradle_touching",
-        "Do two disks leave a cradle when two come in, if its disks touch?",
-        "the limit of small gaps, which is the same in whatever order the collisions come",
-        lay_out(*_on_line(x, IN_CRADLE)),
-        duration=4.0,
-    )
-    return with_oracle(question)
-
-
-def two_disks_and_a_wall() -> Scenario:
-    """A disk, a resting one and a wall, 1 cm apart each, so that three collisions follow within a
-    step."""
-    question = Scenario(
-        "two_disks_and_a_wall",
-        "Do two disks that meet a wall and each other within one step keep their energy?",
-        "keenon/nimblephysics#143, where the energy doubles; collisions moved off the steps",
-        lay_out(
-            [[0.7786, 0.0], [0.9897, 0.0]],
-            [[2.0, 0.0], [0.0, 0.0]],
-            radius=0.1,
-            walls=[[[1.1, -1.0], [1.1, 1.0]]],
-        ),
-        duration=1.0,
-        sample_interval=0.04,  # so that two of the collisions share the middle step too
-    )
-    return with_oracle(question)
 
 
 ROWS = (
-    line_gas,
-    partial(counting_pi, 3, 1.0, 12.0, (1, 2, 4, 8)),
-    partial(counting_pi, 31, 1e2, 15.0, (1, 2, 4, 8)),
+    line_gas(),
+    counting_pi(3, 1.0, 12.0, (1, 2, 4, 8)),
+    counting_pi(31, 1e2, 15.0, (1, 2, 4, 8)),
     # its collisions follow each other by 0.4 ms
-    partial(counting_pi, 314, 1e4, 31.0, (1, 4, 16, 64)),
-    cradle_with_gaps,
-    cradle_touching,
-    two_disks_and_a_wall,
+    counting_pi(314, 1e4, 31.0, (1, 4, 16, 64)),
+    cradle_with_gaps(),
+    with_oracle(
+        Scenario(
+            "cradle_touching",
+            "Do two disks leave a cradle when two come in, if its disks touch?",
+            "the limit of small gaps, which is the same in whatever order the collisions come",
+            # Binary fractions, so that the disks touch exactly.
+            lay_out(*_on_line(np.array([-2.2587890625, -1.7587890625, 0.0, 0.5, 1.0]), IN_CRADLE)),
+            duration=4.0,
+        )
+    ),
+    # A disk, a resting one and a wall, 1 cm apart each, so that three collisions follow within a
+    # step.
+    with_oracle(
+        Scenario(
+            "two_disks_and_a_wall",
+            "Do two disks that meet a wall and each other within one step keep their energy?",
+            "keenon/nimblephysics#143, where the energy doubles; collisions moved off the steps",
+            lay_out(
+                [[0.7786, 0.0], [0.9897, 0.0]],
+                [[2.0, 0.0], [0.0, 0.0]],
+                radius=0.1,
+                walls=[[[1.1, -1.0], [1.1, 1.0]]],
+            ),
+            duration=1.0,
+            sample_interval=0.04,  # so that two of the collisions share the middle step too
+        )
+    ),
 )

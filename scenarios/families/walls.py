@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from crosscheck2d.scenarios.model import Array, Scenario, Trajectory
 from crosscheck2d.scenarios.truth.closed_forms import (
     answer,
     at_rest,
-    bouncing,
+    drop,
     flight,
     offset_growth,
     stacked,
@@ -24,43 +25,13 @@ EPS = float(np.finfo(float).eps)
 ON_FLOOR: dict[str, Any] = {"walls": FLOOR, "gravity": [0.0, -G]}
 
 
-def _ball(name: str, asks: str, height: float, restitution: float, least: float = 0.0) -> Scenario:
-    """A ball dropped from `height` m over the floor; bounces that last less than `least` s are not
-    listed."""
-    radius, mass = 0.25, 1.0
-    scene = lay_out([[0.0, radius + height]], restitution=restitution, **ON_FLOOR)
-
-    def truth(t: Array) -> Trajectory:
-        legs = bouncing(height, G, restitution, t[-1])
-        gap, speed = legs.at(t)
-        lasting = int((np.diff(legs.start)[1:] > least).sum())
-        collisions = legs.wall_collisions(0, (0,), mass, restitution)[:lasting]
-        position, velocity = (np.stack([0 * y, y], axis=-1)[:, None] for y in (gap + radius, speed))
-        return answer(scene, t, (position, velocity), collisions)
-
+def ball(
+    name: str, asks: str, height: float, restitution: float, shortest: float | None = None
+) -> Scenario:
+    scene = lay_out([[0.0, 0.25 + height]], restitution=restitution, **ON_FLOOR)
     source = "the bouncing ball in closed form, to rest and after"
+    truth = partial(drop, scene, height, shortest=shortest)
     return Scenario(name, asks, source, scene, duration=10.0, truth=truth)
-
-
-def bouncing_ball_e1() -> Scenario:
-    return _ball(
-        "bouncing_ball_e1",
-        "Does a ball dropped at e = 1 come back to its height every time?",
-        height=1.54,
-        restitution=1.0,
-    )
-
-
-def bouncing_ball_e09() -> Scenario:
-    """It bounces infinitely often, until it rests at 9 s."""
-    return _ball(
-        "bouncing_ball_e09",
-        "Does a ball dropped at e = 0.9 lose height as it should, and come to rest at the right"
-        " time?",
-        height=1.11,
-        restitution=0.9,
-        least=1e-4,
-    )
 
 
 def wall_to_wall() -> Scenario:
@@ -168,18 +139,6 @@ def disk_between_static_disks() -> Scenario:
     )
 
 
-def rest_on_floor() -> Scenario:
-    scene = lay_out([[0.0, 0.25]], restitution=0.0, **ON_FLOOR)
-    return Scenario(
-        "rest_on_floor",
-        "Does a disk that lies on the floor stay there?",
-        "equilibrium",
-        scene,
-        duration=5.0,
-        truth=lambda t: at_rest(scene, t, stacked(scene)),
-    )
-
-
 def slide_on_incline() -> Scenario:
     # Binary fractions: the disk touches the line through the origin exactly.
     down, normal = np.array([4.0, -3.0]) / 5, np.array([0.375, 0.5])
@@ -205,54 +164,62 @@ def slide_on_incline() -> Scenario:
     )
 
 
-def column_of_ten() -> Scenario:
-    y = 0.25 + 2 * 0.25 * np.arange(10)
-    scene = lay_out(np.stack([np.zeros(10), y], axis=-1), restitution=0.0, **ON_FLOOR)
-    return Scenario(
-        "column_of_ten",
-        "Does a column of ten disks carry its weight, or does it sink, jitter or fall?",
-        "equilibrium, unstable, exact while all centres have the same x",
-        scene,
-        duration=5.0,
-        truth=lambda t: at_rest(scene, t, stacked(scene)),
-    )
-
-
-def heavy_on_light() -> Scenario:
-    scene = lay_out(
-        [[0.0, 0.6], [0.0, 2.0]], radius=0.5, mass=[1.0, 100.0], restitution=0.0, **ON_FLOOR
-    )
-    question = Scenario(
-        "heavy_on_light",
-        "Does a disk of 100 kg stay on a disk of 1 kg, or sink into it?",
-        "after HighMassRatio1 to 3 of Box2D (samples/sample_robustness.cpp)",
-        scene,
-        duration=3.0,
-    )
-    return with_oracle(question)
-
-
-def ball_on_supported_ball() -> Scenario:
-    """The impulse returns from the lower ball."""
-    question = Scenario(
-        "ball_on_supported_ball",
-        "How high does a ball bounce at e = 0.9 from a ball that lies on a floor?",
-        "after Box2D's test/test_restitution.c; the limit of small gaps",
-        lay_out([[0.0, 0.25], [0.0, 1.75]], restitution=0.9, **ON_FLOOR),
-        duration=1.5,
-    )
-    return with_oracle(question)
+def resting(name: str, asks: str, source: str, y: Array) -> Scenario:
+    """Disks on the floor and on each other, whose centres are at the heights y (n,) m."""
+    scene = lay_out(np.stack([0 * y, y], axis=-1), restitution=0.0, **ON_FLOOR)
+    truth = partial(at_rest, scene, collisions=stacked(scene))
+    return Scenario(name, asks, source, scene, duration=5.0, truth=truth)
 
 
 WALLS = (
-    bouncing_ball_e1,
-    bouncing_ball_e09,
-    wall_to_wall,
-    box_billiard,
-    disk_between_static_disks,
-    rest_on_floor,
-    slide_on_incline,
-    column_of_ten,
-    heavy_on_light,
-    ball_on_supported_ball,
+    ball(
+        "bouncing_ball_e1",
+        "Does a ball dropped at e = 1 come back to its height every time?",
+        height=1.54,
+        restitution=1.0,
+    ),
+    # It bounces infinitely often, until it rests at 9 s.
+    ball(
+        "bouncing_ball_e09",
+        "Does a ball dropped at e = 0.9 lose height as it should, and come to rest at the right"
+        " time?",
+        height=1.11,
+        restitution=0.9,
+        shortest=1e-4,
+    ),
+    wall_to_wall(),
+    box_billiard(),
+    disk_between_static_disks(),
+    resting(
+        "rest_on_floor",
+        "Does a disk that lies on the floor stay there?",
+        "equilibrium",
+        np.array([0.25]),
+    ),
+    slide_on_incline(),
+    resting(
+        "column_of_ten",
+        "Does a column of ten disks carry its weight, or does it sink, jitter or fall?",
+        "equilibrium, unstable, exact while all centres have the same x",
+        0.25 + 2 * 0.25 * np.arange(10.0),
+    ),
+    with_oracle(
+        Scenario(
+            "heavy_on_light",
+            "Does a disk of 100 kg stay on a disk of 1 kg, or sink into it?",
+            "after HighMassRatio1 to 3 of Box2D (samples/sample_robustness.cpp)",
+            lay_out([[0.0, 0.6], [0.0, 2.0]], (0, 0), 0.5, [1.0, 100.0], 0.0, **ON_FLOOR),
+            duration=3.0,
+        )
+    ),
+    # The impulse returns from the lower ball.
+    with_oracle(
+        Scenario(
+            "ball_on_supported_ball",
+            "How high does a ball bounce at e = 0.9 from a ball that lies on a floor?",
+            "after Box2D's test/test_restitution.c; the limit of small gaps",
+            lay_out([[0.0, 0.25], [0.0, 1.75]], restitution=0.9, **ON_FLOOR),
+            duration=1.5,
+        )
+    ),
 )

@@ -39,29 +39,13 @@ def folder() -> Path | None:
     return user_cache_path("crosscheck2d", appauthor=False)
 
 
-def key_of(scenario: Scenario, certifying: bool) -> str:
-    """A hash of everything a record depends on: scene, thrusts, duration, the oracle's source, and
-    whether it works with intervals (`certifying`)."""
-    scene, hashed = scenario.scene, hashlib.sha256()
-    parts = [
-        scene.position,
-        scene.velocity,
-        scene.radius,
-        scene.mass,
-        scene.walls,
-        scene.gravity,
-        scene.restitution,
-        [] if scene.wrap is None else scene.wrap,
-        scenario.duration,
-        *([p.disk, p.start, p.stop, *p.force, p.frame == "body"] for p in scenario.thrusts),
-    ]
-    # Else the record holds no rotation.
-    if scene.friction or any(p.frame == "body" for p in scenario.thrusts):
-        torques = [p.torque for p in scenario.thrusts]
-        parts += [scene.friction, scene.inertia, scene.angle, scene.angular_velocity, torques]
-    hashed.update(f"{source_hash()} {certifying} {[np.shape(part) for part in parts]}".encode())
-    for part in parts:
-        hashed.update(np.ascontiguousarray(part, dtype="<f8").tobytes())
+def key_of(scenario: Scenario) -> str:
+    """A hash of everything a record depends on: scene, thrusts, duration, the oracle's source."""
+    thrusts = [value for thrust in scenario.thrusts for value in vars(thrust).values()]
+    hashed = hashlib.sha256(source_hash().encode())
+    for value in [*vars(scenario.scene).values(), *thrusts, scenario.duration]:
+        data = np.ascontiguousarray([] if value is None else value)
+        hashed.update(f"{data.dtype} {data.shape} ".encode() + data.tobytes())
     return hashed.hexdigest()[:32]
 
 

@@ -38,21 +38,11 @@ def answer(
     rad/s; default: every disk keeps its spin. collisions: those after the last sample are dropped.
     reason: why the answer ends at the horizon.
     """
-    angle, angular_velocity = turning or flight(t[:, None], scene.angle, scene.angular_velocity)
+    angle, spin = turning or flight(t[:, None], scene.angle, scene.angular_velocity)
     kept = t <= horizon
-    return Trajectory(
-        t=frozen(t[kept]),
-        position=frozen(motion[0][kept]),
-        velocity=frozen(motion[1][kept]),
-        angle=frozen(angle[kept]),
-        angular_velocity=frozen(angular_velocity[kept]),
-        collisions=Collisions.of(
-            [collision for collision in collisions if kept.any() and collision[0] <= t[kept][-1]]
-        ),
-        horizon=horizon,
-        error_bound=error_bound,
-        reason=reason,
-    )
+    t, x, v, angle, spin = (frozen(part[kept]) for part in (t, *motion, angle, spin))
+    known = Collisions.of([row for row in collisions if len(t) and row[0] <= t[-1]])
+    return Trajectory(t, x, v, angle, spin, known, horizon, error_bound, reason)
 
 
 def at_rest(scene: Scene, t: Array, collisions: Iterable[Collision] = ()) -> Trajectory:
@@ -135,6 +125,20 @@ def bouncing(height: float, gravity: float, restitution: float, until: float) ->
     )
 
 
+def drop(scene: Scene, height: float, t: Array, shortest: float | None = None) -> Trajectory:
+    """A disk dropped from rest `height` m above its floor; bounces that last less than `shortest` s
+    are not listed."""
+    legs = bouncing(height, -scene.gravity[1], scene.restitution, t[-1])
+    gap, speed = legs.at(t)
+    collisions = legs.wall_collisions(0, (0,), scene.mass[0], scene.restitution)
+    if shortest is not None:
+        collisions = collisions[: int((np.diff(legs.start)[1:] > shortest).sum())]
+    position, velocity = (
+        np.stack([0 * y, y], axis=-1)[:, None] for y in (gap + scene.radius[0], speed)
+    )
+    return answer(scene, t, (position, velocity), collisions)
+
+
 def to_and_fro(
     place: float, velocity: float, length: float, restitution: float, until: float
 ) -> Legs:
@@ -147,10 +151,9 @@ def to_and_fro(
     k = np.arange(1.0, int(until * speed / length) + 3)
     first = (length - place if up else place) / speed
     at_top = (k % 2 == 1) == up
+    lasts = length / (speed * restitution) * geometric(1 / restitution, k - 1)
     return Legs(
-        start=np.array(
-            [0, *first + length / (speed * restitution) * geometric(1 / restitution, k - 1)]
-        ),
+        start=np.array([0, *first + lasts]),
         position=np.array([place, *np.where(at_top, length, 0.0)]),
         velocity=np.array([velocity, *np.where(at_top, -1, 1) * speed * restitution**k]),
         acceleration=np.zeros(len(k) + 1),
@@ -209,10 +212,8 @@ def world_thrusts(scene: Scene, thrusts: Sequence[Thrust], t: Array) -> Trajecto
     for thrust in thrusts:
         acted = np.clip(t - thrust.start, 0, thrust.stop - thrust.start)
         moved = acted * (acted / 2 + np.maximum(t - thrust.stop, 0))
-        acceleration, spin_up = (
-            thrust.force / scene.mass[thrust.disk],
-            thrust.torque / scene.inertia[thrust.disk],
-        )
+        acceleration = thrust.force / scene.mass[thrust.disk]
+        spin_up = thrust.torque / scene.inertia[thrust.disk]
         velocity[:, thrust.disk] += acted[:, None] * acceleration
         position[:, thrust.disk] += moved[:, None] * acceleration
         angular_velocity[:, thrust.disk] += acted * spin_up

@@ -14,7 +14,7 @@ from crosscheck2d.scenarios.no_truth import NoTruth
 from crosscheck2d.scenarios.truth.cache import keep, key_of, look_up
 from crosscheck2d.scenarios.truth.oracle.bodies import Leg
 from crosscheck2d.scenarios.truth.oracle.events import trace, turns_with_disk
-from crosscheck2d.scenarios.truth.oracle.numbers import Numbers, Undecided, balls, digits, has_balls
+from crosscheck2d.scenarios.truth.oracle.numbers import Numbers, Undecided, balls, mpfr
 from crosscheck2d.scenarios.truth.oracle.path import Path, TimeLimit, WorkLimit
 from crosscheck2d.scenarios.truth.oracle.resting import FOR_SERIES
 from crosscheck2d.scenarios.truth.record import (
@@ -74,7 +74,7 @@ class OracleTruth:
         `NoTruth`."""
         if self.known is not None:
             return self.known
-        key = key_of(self.scenario, has_balls())
+        key = key_of(self.scenario)
         found = look_up(key)
         if found is None:
             clock = clock or TimeLimit()
@@ -97,8 +97,8 @@ def with_oracle(scenario: Scenario) -> Scenario:
 def computed(
     scenario: Scenario, kind: Callable[[int], Numbers] | None = None, clock: TimeLimit | None = None
 ) -> TruthRecord:
-    """The record of a scenario: proven by interval arithmetic where that is installed and decides
-    every comparison, else computed at two precisions that agree.
+    """The record of a scenario: proven by interval arithmetic where that decides every comparison,
+    else computed at two precisions that agree.
 
     kind: the numbers for two precisions; if given, no interval arithmetic.
     clock: when its time runs out, the record ends where the computation is then.
@@ -117,8 +117,8 @@ def computed(
     turning = scene.friction or turns_with_disk(thrusts)
     forced = [p for p in thrusts if p.force.any() or (turning and p.torque)]
     clock = clock or TimeLimit()
-    record = certified(scenario, forced, clock) if kind is None and has_balls() else None
-    return record or two_precisions(scenario, forced, kind or digits, clock)
+    record = certified(scenario, forced, clock) if kind is None else None
+    return record or two_precisions(scenario, forced, kind or mpfr, clock)
 
 
 def certified(scenario: Scenario, forced: Sequence[Thrust], clock: TimeLimit) -> TruthRecord | None:
@@ -132,9 +132,8 @@ def certified(scenario: Scenario, forced: Sequence[Thrust], clock: TimeLimit) ->
     attempts: list[tuple[Path, int]] = []
     while bits <= MOST_BITS:
         try:
-            path = trace(
-                scenario.scene, forced, until, balls(bits), WorkLimit(allowed_steps(bits), clock)
-            )
+            work = WorkLimit(allowed_steps(bits), clock)
+            path = trace(scenario.scene, forced, until, balls(bits), work)
             error, reached = widest(widths(path), min(path.end, until)), until
             if error < accuracy and not clock.expired:
                 return record_of(scenario, path, error, bits, CERTIFIED)
@@ -186,14 +185,9 @@ def widths(path: Path) -> Array:
         angle, spin = leg.turn[:2] if leg.turn else (leg.x, leg.vx)
         places, rates = (leg.x, leg.y, angle), (leg.vx, leg.vy, spin)
         late, speed = float(leg.t.rad()), max(float(abs(rate)) for rate in rates)
-        rows.append(
-            (
-                float(leg.t),
-                max(float(place.rad()) for place in places) + late * speed,
-                max(float(rate.rad()) for rate in rates)
-                + sum(float(x.rad()) for x in leg.hop or ()),
-            )
-        )
+        width = max(float(place.rad()) for place in places) + late * speed
+        hop = sum(float(x.rad()) for x in leg.hop or ())
+        rows.append((float(leg.t), width, max(float(rate.rad()) for rate in rates) + hop))
     return np.array(rows)
 
 
@@ -208,12 +202,10 @@ def two_precisions(
     scene, until, bits = scenario.scene, scenario.duration, FEWEST_BITS
     attempts: list[tuple[Path, float, int]] = []
     while True:
-        coarse = trace(
-            scene, forced, until, kind(bits), WorkLimit(allowed_steps(bits), clock, COARSE)
-        )
-        fine = trace(
-            scene, forced, until, kind(2 * bits), WorkLimit(allowed_steps(2 * bits), clock)
-        )
+        work = WorkLimit(allowed_steps(bits), clock, COARSE)
+        coarse = trace(scene, forced, until, kind(bits), work)
+        work = WorkLimit(allowed_steps(2 * bits), clock)
+        fine = trace(scene, forced, until, kind(2 * bits), work)
         diverged, error = difference(coarse, fine, until, kind(2 * bits), accuracy_of(scenario))
         end = min(coarse.end, fine.end, until)
         if clock.expired and coarse.end < fine.end:
@@ -283,9 +275,8 @@ def difference(
     with k.precise():
         for mine, theirs in zip(coarse.legs, fine.legs):
             for leg in mine[len(theirs) :] + theirs[len(mine) :]:
-                diverged = (
-                    min(diverged, float(leg.t)) if float(leg.t) < end - ACCURACY else diverged
-                )
+                if float(leg.t) < end - ACCURACY:
+                    diverged = min(diverged, float(leg.t))
             for one, other in zip(mine, theirs):
                 t = min(float(one.t), float(other.t))
                 if t < end and (error := _apart(one, other, end - t)) > accuracy:

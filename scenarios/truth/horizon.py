@@ -123,12 +123,8 @@ class TangentVectors:
         hop = self.path.legs[i][self.leg[i]].hop
         if hop is not None:
             self.bounce(i, hop)
-        here, drift, since, limit = (
-            self.dx[i],
-            self.dv[i],
-            until - self.t[i],
-            DIVERGED * self.scene.radius[i],
-        )
+        here, drift = self.dx[i], self.dv[i]
+        since, limit = until - self.t[i], DIVERGED * self.scene.radius[i]
         # |dx + dv s|^2 = limit^2, summed over the deviations: they are independent, so that their
         # variances add.
         room, slope, growth = limit**2 - (here**2).sum(), (here * drift).sum(), (drift**2).sum()
@@ -182,11 +178,8 @@ class TangentVectors:
                 return np.zeros_like(self.late)
             late = -(self.dv[i] @ way + arm * self.dw[i]) / slower
             return late
-        spans = [
-            self.scene.walls[c.j, 1] - self.scene.walls[c.j, 0]
-            for c in leg.held
-            if c.kind == "wall"
-        ]
+        walls = [self.scene.walls[c.j] for c in leg.held if c.kind == "wall"]
+        spans = [end - start for start, end in walls]
         if len(spans) == 1 and (speed := float(spans[0] @ along(leg, t)[1])):
             late = -self.dx[i] @ spans[0] / speed
             return late
@@ -226,10 +219,8 @@ class TangentVectors:
         if self.scene.friction:
             friction, d_friction = self.friction_impulse(one, two, normal, tilt, impulse, more)
             tangent, turned = perpendicular(normal), perpendicular(tilt)
-            kick, change = (
-                kick + friction * tangent,
-                change + friction * turned + np.outer(d_friction, tangent),
-            )
+            kick = kick + friction * tangent
+            change = change + friction * turned + np.outer(d_friction, tangent)
         for disk, body, side in ((event.i, one, -one.weight), (event.j, two, two.weight)):
             if side:
                 self.dx[disk] -= side * kick * late
@@ -325,8 +316,6 @@ def perpendicular(vector: Array) -> Array:
 
 def acceleration(leg: Leg) -> Array:
     a = np.array([float(leg.ax), float(leg.ay)])
-    return (
-        a
-        if leg.hop is None
-        else a - float(leg.hop.fall) * np.array([float(leg.hop.nx), float(leg.hop.ny)])
-    )
+    if leg.hop is None:
+        return a
+    return a - float(leg.hop.fall) * np.array([float(leg.hop.nx), float(leg.hop.ny)])

@@ -18,7 +18,7 @@ import numpy as np
 from crosscheck2d.scenarios.model import Array, Scenario
 from crosscheck2d.scenarios.truth.horizon import DIVERGED, EPS, TangentVectors
 from crosscheck2d.scenarios.truth.oracle.bodies import Bodies
-from crosscheck2d.scenarios.truth.oracle.numbers import digits
+from crosscheck2d.scenarios.truth.oracle.numbers import mpfr
 from crosscheck2d.scenarios.truth.oracle.path import Event, Path
 from crosscheck2d.scenarios.truth.oracle.ties import (
     ENDLESS,
@@ -180,7 +180,7 @@ class CollisionOrder:
     ) -> tuple[list[TieOutcome], list[list[tuple[int, int]]]]:
         """Over all orders; without those from which no disk diverges until the end. And
         `Path.named`."""
-        k, scene = digits(BITS), self.scene
+        k, scene = mpfr(BITS), self.scene
         with k.precise():
             bodies, v, ends = Bodies(scene, k), Velocities(), list[TieOutcome]()
             for i in {i for one in near for i in one.contact.disks}:

@@ -96,20 +96,9 @@ class TruthRecord:
         ]
         until, reason = self.horizon, self.reason
         if self.float64_horizon < until:
-            until, reason = (
-                self.float64_horizon,
-                "beyond it the rounding of float64 makes any engine diverge",
-            )
-        return answer(
-            scene,
-            t,
-            moved,
-            collisions,
-            turned,
-            until,
-            self.error_bound,
-            reason,
-        )
+            until = self.float64_horizon
+            reason = "beyond it the rounding of float64 makes any engine diverge"
+        return answer(scene, t, moved, collisions, turned, until, self.error_bound, reason)
 
 
 def along(leg: Array, t: Array, restitution: float) -> tuple[Array, Array]:
@@ -120,8 +109,7 @@ def along(leg: Array, t: Array, restitution: float) -> tuple[Array, Array]:
     v / (g (1 - e)) on there is none (any textbook of mechanics, under "bouncing ball").
     """
     since, normal, speed = (t - leg[:, T])[:, None], leg[:, NORMAL], leg[:, SPEED, None]
-    v, a = leg[:, VELOCITY], leg[:, ACCELERATION]
-    position, velocity = leg[:, PLACE] + (v + a * since / 2) * since, v + a * since
+    position, velocity = flight(since, leg[:, PLACE], leg[:, VELOCITY], leg[:, ACCELERATION])
     hops = speed[:, 0] > 0
     if hops.any():
         e, s, u, g = restitution, since[hops], speed[hops], leg[hops, FALL, None]
@@ -220,18 +208,13 @@ def last_time(holds: Callable[[float], bool], end: float) -> float:
 
 
 def legs_of(path: Path, end: float) -> Array:
-    flights = [
-        (i, leg)
+    rows = [
+        [i, *map(float, (*leg[:7], *(leg.hop or NO_HOP), *(leg.turn or NO_TURN)))]
         for i, legs in enumerate(path.legs)
         for leg in legs
         if float(leg.t) < end or leg is legs[0]
     ]
-    return np.array(
-        [
-            [i, *map(float, (*leg[:7], *(leg.hop or NO_HOP), *(leg.turn or NO_TURN)))]
-            for i, leg in flights
-        ]
-    )
+    return np.array(rows)
 
 
 def reach(legs: Array, until: float) -> float:
@@ -240,13 +223,11 @@ def reach(legs: Array, until: float) -> float:
     begun = legs[:, T] <= until
     follows = np.append(legs[1:, DISK] == legs[:-1, DISK], False)
     stop = np.minimum(np.where(follows, np.append(legs[1:, T], until), until), until)
-    s, (x, v, a) = (
-        np.maximum(stop - legs[:, T], 0.0)[:, None],
-        (legs[:, PLACE], legs[:, VELOCITY], legs[:, ACCELERATION]),
-    )
+    s, a = np.maximum(stop - legs[:, T], 0.0)[:, None], legs[:, ACCELERATION]
+    x, v = flight(s, legs[:, PLACE], legs[:, VELOCITY], a)
     # the last term bounds the apex between the two ends
-    far = np.maximum(np.abs(x), np.abs(x + (v + a * s / 2) * s)) + np.abs(a) * s**2 / 8
-    speed = np.maximum(np.abs(v), np.abs(v + a * s)) + legs[:, SPEED, None]
+    far = np.maximum(np.abs(legs[:, PLACE]), np.abs(x)) + np.abs(a) * s**2 / 8
+    speed = np.maximum(np.abs(legs[:, VELOCITY]), np.abs(v)) + legs[:, SPEED, None]
     return float(far[begun].max() + until * speed[begun].max())
 
 
@@ -290,12 +271,8 @@ def remains(scene: Scene, legs: Array, disks: Sequence[int], end: float) -> Iter
     """Sentences on what holds for these disks after the end: their momentum along the walls they
     touch, if all these are parallel, is conserved, and their energy does not grow."""
     ours = [i for i in sorted(set(disks)) if i < scene.n and not scene.static[i]]
-    last = [legs[(legs[:, DISK] == i) & (legs[:, T] <= end)][-1] for i in ours]
-    x, v = (
-        np.array(part)
-        for part in zip(*(along(leg[None], np.array([end]), scene.restitution) for leg in last))
-    )
-    x, v, mass = x[:, 0], v[:, 0], scene.mass[ours]
+    last = np.array([legs[(legs[:, DISK] == i) & (legs[:, T] <= end)][-1] for i in ours])
+    (x, v), mass = along(last, np.full(len(last), end), scene.restitution), scene.mass[ours]
     share, distance = nearest(x, scene.walls)
     touched = distance - scene.radius[ours][:, None] < TOUCH
     near = (scene.walls[:, 1] - scene.walls[:, 0])[touched.any(axis=0)]

@@ -22,12 +22,12 @@ from crosscheck2d.adapters.advance import advance
 from crosscheck2d.adapters.conformance.conform import ask, conform
 from crosscheck2d.adapters.conformance.probe import history, loaded, plain, scene_of
 from crosscheck2d.adapters.engine import Unsupported
-from crosscheck2d.adapters.engines import ENGINES, FETCHED, UNASKED
+from crosscheck2d.adapters.engines import ENGINES, FETCHED, NAMED, UNASKED
 from crosscheck2d.adapters.host import gl_matrix
 from crosscheck2d.adapters.host.engine import PackageEngine
 from crosscheck2d.adapters.host.file import read_solver
 from crosscheck2d.adapters.host.process import SolverProcess, waiting
-from crosscheck2d.adapters.library_at_version import FORM, NotInstalled, digest_of
+from crosscheck2d.adapters.library_at_version import FORM, NotInstalled, digest_of, script_of
 from crosscheck2d.adapters.mechanisms import table as mechanisms
 from crosscheck2d.adapters.mechanisms.table import mechanisms_of, with_mechanisms
 from crosscheck2d.adapters.npm_packages import (
@@ -49,6 +49,7 @@ from tests.reports.terminal.command_line import crosscheck
 from tests.solvers.mutants import HERE as SOLVERS
 from tests.tolerances import share_that_sticks
 
+ROWS = FETCHED | NAMED
 REASONS = {package: missing(package) for package in pinned()["played"]}
 fetched = pytest.mark.skipif(
     any(REASONS.values()), reason="; ".join(filter(None, dict.fromkeys(REASONS.values())))
@@ -134,6 +135,23 @@ KNOWN: dict[str, dict[str, tuple[float, float] | str]] = {
         "friction_0.5": (0.2 / 1.5, 1e-6),
         "friction_1": (0.2 / 2, 1e-6),
     },
+    "box2d_wasm:shipped": {
+        "slow_flight": (0.0, 0.0),  # put to sleep
+        "fast_flight": (400.0, 400 * 2.0**-22),
+        "fast_spin": (pi / 4 * 64, 16 * pi * 2.0**-22),  # an eighth of a turn a step
+        "spins_freely": (1024 * atan(20 / 1024), 3e-4),
+        **{f"restitution_{speed}": (0.0, 2.0**-21) for speed in ("0.01", "0.1", "0.5")},
+        "friction": (0.6 / 1.5, 2.0**-21),  # its default, bounded before restitution is added
+        **STUCK,
+        "friction_0.5": (0.2 / 1.5, 2.0**-21),
+        "friction_1": (0.2 / 2, 2.0**-21),
+    },
+    "box2d_wasm:matched": {
+        "spins_freely": (1024 * atan(20 / 1024), 3e-4),
+        "friction_0.5": (0.2 / 1.5, 2.0**-21),
+        "friction_1": (0.2 / 2, 2.0**-21),
+        "friction_at_rest": "as of box2d_v3:matched: the gap seems wider to a disk that turns",
+    },
     "rapier2d:matched": {
         "fast_flight": "refused: it cuts the speed",
         "fast_spin": "refused: it cuts the spin",
@@ -146,12 +164,12 @@ KNOWN: dict[str, dict[str, tuple[float, float] | str]] = {
 
 @cache
 def findings_of(name):
-    return {finding.probe: finding for finding in conform(name, FETCHED[name])}
+    return {finding.probe: finding for finding in conform(name, ROWS[name])}
 
 
 QUICK = ("planck:matched",)
 EACH = [
-    pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in FETCHED
+    pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in ROWS
 ]  # three to five seconds each
 
 
@@ -191,9 +209,9 @@ def test_planck_differs_from_box2d_by_float32_alone():
 
 
 @fetched
-@pytest.mark.parametrize("name", [name for name in FETCHED if name.endswith("matched")])
+@pytest.mark.parametrize("name", [name for name in ROWS if name.endswith("matched")])
 def test_a_process_that_has_played_gives_the_bits_of_a_new_one(name):
-    row = FETCHED[name]
+    row = ROWS[name]
     waiting.clear()
     seen = []
     for _ in range(2):
@@ -215,9 +233,9 @@ def test_the_time_in_v8_is_a_part_of_that_of_a_step():
 
 
 @fetched
-@pytest.mark.parametrize("name", [name for name in FETCHED if name.endswith("matched")])
+@pytest.mark.parametrize("name", [name for name in ROWS if name.endswith("matched")])
 def test_steps_played_ahead_give_the_bits_and_collisions_of_steps_one_by_one(name):
-    with loaded(FETCHED[name], plain()) as singly, loaded(FETCHED[name], plain()) as ahead:
+    with loaded(ROWS[name], plain()) as singly, loaded(ROWS[name], plain()) as ahead:
         ahead.expect(3, 20)
         for _ in range(20):
             singly.step(3)
@@ -279,6 +297,33 @@ def test_a_refusal_comes_at_its_own_sample_though_it_was_played_ahead():
             engine.read()
             read += 1
     assert 0 < len(run.trajectory) - 1 == read < 24
+
+
+@fetched
+@pytest.mark.parametrize(("allowed", "spin"), [(True, 300.0), (False, 16 * pi)])
+def test_a_disk_of_box2d_wasm_spins_fast_where_fast_rotation_is_allowed(allowed, spin):
+    row = NAMED["box2d_wasm:matched"]
+    row = replace(row, make=partial(row.make, fast_rotation=allowed))
+    free = scene_of(
+        position=[[0.0, 0.0]],
+        velocity=[[0.0, 0.0]],
+        radius=[0.5],
+        mass=[1.0],
+        angular_velocity=[300.0],
+    )
+    with loaded(row, free, dt=1 / 64) as engine:
+        engine.step(4)
+        assert engine.read().angular_velocity[0] == pytest.approx(spin, rel=1e-6)
+
+
+@fetched
+@pytest.mark.parametrize("scene", ["oblique_e09", "friction_bounce_e1_mu05", "ship_thrust"])
+def test_box2d_wasm_as_shipped_moves_disks_as_pyb2d3_does_to_the_bit(scene):
+    one = scenario(scene)
+    rows = ENGINES["box2d_v3:shipped"], NAMED["box2d_wasm:shipped"]
+    first, second = (play_once(row.make, "x:shipped", one, one.dt(4)).trajectory for row in rows)
+    assert first.position.tobytes() == second.position.tobytes()
+    assert first.velocity.tobytes() == second.velocity.tobytes()
 
 
 @fetched
@@ -438,7 +483,7 @@ def npm(empty, monkeypatch):
     """An npm that packs a planck of one line, which is pinned as it is; its text can be changed."""
     packed = SimpleNamespace(cache=empty, name="dist/planck.min.js", other_is_faster=False)
     packed.text, packed.error = "module.exports = {};", ""
-    played = {"file": "dist/planck.min.js", "integrity": integrity(packed.text.encode())}
+    played = {"file": "dist/planck.min.js", "integrity": integrity(packed.text)}
     monkeypatch.setattr(
         packages,
         "pinned",
@@ -464,14 +509,14 @@ def npm(empty, monkeypatch):
 
 def test_every_package_has_an_exact_version_and_a_hash():
     versions, files = pinned()["dependencies"], pinned()["played"]
-    assert set(versions) == set(files) == {row.package for row in FETCHED.values()} | {"gl-matrix"}
+    assert set(versions) == set(files) == {row.package for row in ROWS.values()} | {"gl-matrix"}
     assert all(FORM.fullmatch(version) for version in versions.values())
     assert all(file["integrity"].startswith("sha512-") for file in files.values())
 
 
 def test_without_the_extra_a_row_says_how_it_is_installed(empty):
     listed = crosscheck("list", "engines", cwd=empty)
-    assert " ".join(listed.stdout.split()).count("not installed: uv run --extra js") == len(FETCHED)
+    assert " ".join(listed.stdout.split()).count("not installed: uv run --extra js") == len(ROWS)
     waiting.clear()
     one = scenario("free_fall")
     run = play_once(FETCHED["planck:matched"].make, "planck:matched", one, one.dt(1))
@@ -552,7 +597,7 @@ def test_a_file_that_has_changed_or_gone_is_refused_and_fetched_again(npm, text,
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        ({"text": "another"}, f"has {re.escape(integrity(b'another'))}"),
+        ({"text": "another"}, f"has {re.escape(integrity('another'))}"),
         ({"name": "planck.js"}, "is not there"),
     ],
 )
@@ -561,6 +606,17 @@ def test_what_npm_fetched_is_refused_with_the_hash_that_was_found(npm, change, s
     with pytest.raises(NotInstalled, match=rf"fetched of planck .* dist/planck\.min\.js {says}"):
         fetch()
     assert [path for path in npm.cache.rglob("*") if path.is_file()] == []
+
+
+def test_an_es_module_beside_its_webassembly_is_a_script_that_holds_it(tmp_path):
+    (tmp_path / "a.mjs").write_text("const b = () => import.meta.url;\nexport default b;\n")
+    (tmp_path / "a.wasm").write_bytes(b"\0asm")
+    assert script_of(tmp_path / "a.mjs").splitlines() == [
+        'const b = () => "";',
+        "module.exports = b;",
+        "",
+        'module.exports.wasm = "AGFzbQ==";',
+    ]
 
 
 def test_two_who_fetch_at_once_do_not_disturb_each_other(npm):

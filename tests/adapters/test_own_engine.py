@@ -17,7 +17,7 @@ from crosscheck2d.adapters.conformance.conform import ask, conform
 from crosscheck2d.adapters.engine_row import EngineRow
 from crosscheck2d.adapters.host.engine import TEMPLATES, row_of_file
 from crosscheck2d.adapters.host.file import NotASolver
-from crosscheck2d.adapters.host.process import SolverProcess
+from crosscheck2d.adapters.host.process import SolverProcess, waiting
 from crosscheck2d.adapters.host.surface import FEATURES
 from crosscheck2d.adapters.play import play, play_once
 from crosscheck2d.adapters.run import Run
@@ -96,7 +96,9 @@ def test_a_probe_begins_with_the_file_as_it_was_written(
     first = []
 
     def not_anew(process: SolverProcess) -> Any:
-        if not (first and process.reuse()):
+        if first and (idle := waiting.pop(process.key, None)):
+            process.process, process.pieces, process.level, _ = idle
+        else:
             first.append(connect(process))
         return first[0]
 

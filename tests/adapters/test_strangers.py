@@ -161,7 +161,7 @@ def test_a_file_of_another_kind_says_what_to_do(name: str, hint: str, tmp_path: 
         read_solver(tmp_path / name)
     done = crosscheck("run", "free_fall", "--engine", name, cwd=tmp_path)
     assert (done.returncode, done.stderr.count("\n")) == (2, 1)
-    assert hint in done.stderr or name.endswith(".zip")
+    assert hint in done.stderr
 
 
 def test_check_says_of_a_ported_engine_that_it_is_one(tmp_path: Path):
@@ -214,21 +214,17 @@ HINTS = {
         ' --move "advance_disk(ball, dt, width, height)"'
     ),
 }
-FIVE = ("five.py", '--fields "x y u v r"')  # no mass
-PLAIN = '--fields "x y u v r m" --collide hit --move go --per-frame 60 --pixels 100 --y-down'
 
 
 @pytest.mark.parametrize(
     ("name", "hints"),
     [
         pytest.param(*each, marks=[] if k % 4 == 0 else [pytest.mark.slow], id=each[0])
-        for k, each in enumerate(
-            [*HINTS.items(), *dict.fromkeys(("plain.js", "plain.py"), PLAIN).items(), FIVE]
-        )
+        for k, each in enumerate(HINTS.items())
     ],
 )
 def test_a_ball_code_is_ported_by_hints_alone(name: str, hints: str, tmp_path: Path):
-    source = ("--from", str(STRANGERS / name)) if name in HINTS else ()
+    source = ("--from", str(STRANGERS / name))
     done = crosscheck("new-engine", name, *source, *shlex.split(hints), cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     pair, crowd = (scenario(each) for each in ("head_on_equal_e1", "gas_of_100"))
@@ -254,13 +250,35 @@ def test_a_ball_code_is_ported_by_hints_alone(name: str, hints: str, tmp_path: P
 
 
 @pytest.mark.parametrize(
+    ("name", "code"),
+    [
+        ("five.py", "move = lambda b, dt: (setattr(b, 'x', b.x + b.u * dt))\ncollide = print\n"),
+        ("five.js", "const move = (b, dt) => { b.x += b.u * dt; }, collide = () => 0;\n"),
+    ],
+)
+def test_hints_without_a_code_leave_a_place_for_it(name: str, code: str, tmp_path: Path):
+    done = crosscheck("new-engine", name, "--fields", "x y u v r", cwd=tmp_path)
+    assert (done.returncode, "once it has your code" in done.stdout) == (0, True), done.stderr
+    path, pair = tmp_path / name, scenario("head_on_equal_e1")
+    begin, place, end = path.read_text().partition(
+        "Put your code here, above the class at the end."
+    )
+    assert place
+    path.write_text(f"{begin}\n{code}{end}")
+    run = play_once(row_of_file(path).make, "x:own", pair, pair.dt(1))
+    assert run.status == "ok", run.reason
+    assert run.trajectory is not None
+    path_x = pair.scene.position[:, 0] + pair.scene.velocity[:, 0] * run.trajectory.t[-1]
+    np.testing.assert_allclose(run.trajectory.position[-1, :, 0], path_x, atol=1e-9)
+
+
+@pytest.mark.parametrize(
     ("hints", "says"),
     [
         ('--fields "x y"', "must be the names of x, y, vx, vy, radius and mass"),
         ('--fields "p.x p.y v.x v.y r"', "--ball has to say how such a ball is made"),
         ('--box "w"', "must be the names of its width and its height"),
         ("--pixels 0", "--pixels 0: must be above 0"),
-        ("--step update", "--from has to name the code"),
         ("--from nothing.py", "--from nothing.py"),
         (f"--from {STRANGERS / 'whole_step.js'}", "is in another language"),
     ],

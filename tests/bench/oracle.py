@@ -21,7 +21,7 @@ from crosscheck2d.scenarios.catalogue import scenario
 from crosscheck2d.scenarios.model import Scenario
 from crosscheck2d.scenarios.truth.exact import accuracy_of, computed, difference
 from crosscheck2d.scenarios.truth.oracle.events import trace
-from crosscheck2d.scenarios.truth.oracle.numbers import digits
+from crosscheck2d.scenarios.truth.oracle.numbers import mpfr
 from crosscheck2d.scenarios.truth.record import TruthRecord
 from tests.scenarios.exercise_box import boxed, lasting
 
@@ -93,8 +93,8 @@ def said(one: Scenario, record: TruthRecord) -> Row:
 def growth(one: Scenario, bits: int = 128) -> float:
     """1/s, of the distance of runs with so many and twice as many bits, from 2^-bits to what they
     may be off."""
-    coarse, fine = (trace(one.scene, [], one.duration, digits(each)) for each in (bits, 2 * bits))
-    diverged, _ = difference(coarse, fine, one.duration, digits(2 * bits), accuracy_of(one))
+    coarse, fine = (trace(one.scene, [], one.duration, mpfr(each)) for each in (bits, 2 * bits))
+    diverged, _ = difference(coarse, fine, one.duration, mpfr(2 * bits), accuracy_of(one))
     return (bits * log(2) + log(accuracy_of(one))) / diverged
 
 

@@ -13,7 +13,6 @@ import pytest
 
 from crosscheck2d.scenarios.model import Scenario
 from crosscheck2d.scenarios.truth.exact import ACCURACY, computed
-from crosscheck2d.scenarios.truth.oracle.numbers import has_balls
 from tests.bench.oracle import FIGURES, FLOORS, questions, said
 from tests.scenarios.test_catalogue import smallest_gap
 
@@ -43,9 +42,6 @@ def test_falling_boxes_are_answered_beyond_their_first_rest():
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(
-    not has_balls(), reason="python-flint is an extra: without it no row is certified"
-)
 @pytest.mark.parametrize(
     ("name", "one"),
     [

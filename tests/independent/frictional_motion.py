@@ -70,17 +70,8 @@ def resolve(scene: Scene, i: int, j: int, way: Array, v: Array, spin: Array) -> 
     turns = [1 / scene.inertia[i], 1 / scene.inertia[j] if j >= 0 and weights[1] else 0.0]
     arms = [scene.radius[i] * n, -scene.radius[j] * n if j >= 0 else 0 * n]
     # Rows: what the six speeds (of both: x, y, spin) make of the normal and tangential speed.
-    rows = np.array(
-        [
-            [
-                *-d,
-                -(arms[0][0] * d[1] - arms[0][1] * d[0]),
-                *d,
-                arms[1][0] * d[1] - arms[1][1] * d[0],
-            ]
-            for d in (n, t)
-        ]
-    )
+    levers = [[arm[0] * d[1] - arm[1] * d[0] for arm in arms] for d in (n, t)]
+    rows = np.array([[*-d, -first, *d, second] for d, (first, second) in zip((n, t), levers)])
     speeds = np.array([*v[i], spin[i], *(v[j] if j >= 0 else (0, 0)), spin[j] if j >= 0 else 0])
     inverse = np.array([weights[0], weights[0], turns[0], weights[1], weights[1], turns[1]])
     matrix, relative = rows * inverse @ rows.T, rows @ speeds

@@ -73,13 +73,8 @@ def sampled(
 def play_pymunk(scenario: Scenario, dt: float, asked: dict[str, Any]) -> Samples:
     scene, space = scenario.scene, pymunk.Space()
     space.gravity = tuple(scene.gravity.tolist())
-    for name in (
-        "iterations",
-        "collision_slop",
-        "collision_bias",
-        "collision_persistence",
-        "damping",
-    ):
+    biases = ("collision_slop", "collision_bias", "collision_persistence")
+    for name in ("iterations", "damping", *biases):
         if name in asked:
             setattr(space, name, asked[name])
     elasticity, friction, bodies = asked["elasticity"], asked["friction"], []
@@ -128,10 +123,8 @@ def play_box2d(scenario: Scenario, dt: float, asked: dict[str, Any]) -> Samples:
     edges."""
     scene = scenario.scene
     # Units a metre, s a unit, units a m/s.
-    length, time = (
-        1 / float(asked.get("unit of length in m", 1.0)),
-        float(asked.get("unit of time in s", 1.0)),
-    )
+    length = 1 / float(asked.get("unit of length in m", 1.0))
+    time = float(asked.get("unit of time in s", 1.0))
     speed = length * time
     iterations = [int(word) for word in asked["velocity, position iterations"].split(",")]
     world = Box2D.b2World(gravity=tuple((scene.gravity * (length * time**2)).tolist()))
@@ -247,11 +240,8 @@ def played_box2d_v3(
             )
             body.create_circle_shape(definition, circle)
             mass = pyb2d3.MassData()
-            mass.mass, mass.rotational_inertia, mass.center = (
-                float(scene.mass[i]),
-                float(scene.inertia[i]),
-                (0, 0),
-            )
+            mass.mass, mass.rotational_inertia = float(scene.mass[i]), float(scene.inertia[i])
+            mass.center = (0, 0)
             body.mass_data = mass
         bodies.append(body)
     angles = scene.angle.copy()
@@ -284,28 +274,24 @@ def played_box2d_v3(
 
 
 PLAIN = {"pymunk": play_pymunk, "box2d": play_box2d, "box2d_v3": play_box2d_v3}
-KNOWN = {
-    "elasticity",
-    "iterations",
-    "collision_slop",
-    "collision_bias",
-    "collision_persistence",
-    "damping",
-    "unit of length in m",
-    "unit of time in s",
-    "wall skin in m",
-    "velocity, position iterations",
-    "friction",
-    "restitution",
-    "sleeping",
-    "continuous collision",
-    "continuous collision between disks",
-    "sub-stepping",
-    "warm starting",
-    "length unit in m",
-    "restitution threshold in m/s",
-    "speed cap in m/s",
-    "substeps",
-    "contact tuning (hertz, damping ratio, push speed in m/s)",
-}
-"""The settings that are asked for here; what an adapter asks for beside them would go unnoticed."""
+
+
+class Settings(dict[str, Any]):
+    """Notes which of its keys are `read`: what an adapter asks for beside them would go unnoticed
+    here."""
+
+    def __init__(self, asked: dict[str, Any]) -> None:
+        super().__init__(asked)
+        self.read = set[str]()
+
+    def __contains__(self, name: object) -> bool:
+        self.read.add(str(name))
+        return super().__contains__(name)
+
+    def __getitem__(self, name: str) -> Any:
+        self.read.add(name)
+        return super().__getitem__(name)
+
+    def get(self, name: str, default: Any = None) -> Any:
+        self.read.add(name)
+        return super().get(name, default)

@@ -130,16 +130,8 @@ def momentum_error(one: Trajectory, _: None, scenario: Scenario) -> float | None
         outside = outside + thrust.force * on[:, None]
     momentum = (mass * one.velocity).sum(axis=1)
     # between two changes of the thrusts a velocity moves on a line: it is longest at an end of one
-    ends = sorted(
-        {
-            0.0,
-            *(
-                min(at, scenario.duration)
-                for thrust in scenario.thrusts
-                for at in (thrust.start, thrust.stop)
-            ),
-        }
-    )
+    edges = [at for thrust in scenario.thrusts for at in (thrust.start, thrust.stop)]
+    ends = sorted({0.0, *(min(at, scenario.duration) for at in edges)})
     scale = 0.0
     for disk, weight in enumerate(mass[:, 0]):
         speeds = []
@@ -161,12 +153,8 @@ def angular_momentum_error(one: Trajectory, _: None, scenario: Scenario) -> floa
 
     Over the sum of m(|x| + r)|v| + I|w| at the start: a collision at a disk's edge has that lever.
     """
-    if (
-        not alone(scenario)
-        or scenario.scene.gravity.any()
-        or scenario.thrusts
-        or scenario.scene.wrap is not None
-    ):
+    turned = scenario.scene.gravity.any() or scenario.thrusts or scenario.scene.wrap is not None
+    if turned or not alone(scenario):
         return None
     mass, inertia = moving(scenario), scenario.scene.inertia
     centre = (mass[:, None] * scenario.scene.position).sum(axis=0) / mass.sum()

@@ -15,9 +15,8 @@ from crosscheck2d.scenarios.model import Array, Scenario, Scene, Thrust
 
 Draw = np.random.Generator
 
-INTERVAL = (
-    1 / 16
-)  # s; thrusts start and stop at samples, so that every step is under a thrust as a whole
+# s; thrusts start and stop at samples, so that every step is under a thrust as a whole
+INTERVAL = 1 / 16
 RESTITUTIONS = (0.0, 0.02, 0.5, 0.9, 1.0, None)  # None: anything from 0 to 1
 NEAREST = 1e-3  # m between things that do not touch
 GRID = 1 / 8  # m; multiples of it are exact in float64, and so is whether disks on it touch
@@ -32,9 +31,8 @@ def random_scenario(seed: int, number: int) -> Scenario:
     draw = np.random.default_rng([seed, number])
     layout = list(LAYOUTS)[number % len(LAYOUTS)]
     walls = LAYOUTS[layout](draw)
-    position, radius = (lattice if layout == "touching" else scattered)(
-        draw, walls, int(draw.integers(1, 7))
-    )
+    place = lattice if layout == "touching" else scattered
+    position, radius = place(draw, walls, int(draw.integers(1, 7)))
     n = len(radius)
     fixed = draw.random(n) < 0.15
     fixed[draw.integers(n)] = False
@@ -103,13 +101,8 @@ def lattice(draw: Draw, _walls: Array, count: int) -> tuple[Array, Array]:
     exactly."""
     radius = GRID * draw.choice([1, 2])
     places = np.array([(column, row) for row in range(2) for column in range(4)])
-    kept = places[
-        np.sort(
-            draw.choice(
-                len(places), count, replace=False, p=np.array([8, 6, 4, 2, 4, 2, 1, 1]) / 28
-            )
-        )
-    ]
+    share = np.array([8, 6, 4, 2, 4, 2, 1, 1]) / 28
+    kept = places[np.sort(draw.choice(len(places), count, replace=False, p=share))]
     return np.array(CORNER) + radius * (2 * kept + 1), np.full(count, radius)
 
 
@@ -130,24 +123,15 @@ def ring(corners: Array) -> Array:
     return np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
 
 
-def upright_box(_draw: Draw) -> Array:
-    return box(CORNER, (1.75, 1.5))
-
-
 def tilted_box(draw: Draw) -> Array:
     """Right angles, but for rounding."""
-    return ring(
-        draw.uniform(1.6, 2.4) * toward(draw.uniform(0, np.pi / 2) + np.pi / 2 * np.arange(4))
-    )
+    size = draw.uniform(1.6, 2.4)
+    return ring(size * toward(draw.uniform(0, np.pi / 2) + np.pi / 2 * np.arange(4)))
 
 
 def triangle(draw: Draw) -> Array:
-    return ring(
-        2.2
-        * toward(
-            draw.uniform(0, 2 * np.pi) + np.array([0.0, 2.0, 4.0]) + draw.uniform(-0.7, 0.7, 3)
-        )
-    )
+    angle = draw.uniform(0, 2 * np.pi) + np.array([0.0, 2.0, 4.0])
+    return ring(2.2 * toward(angle + draw.uniform(-0.7, 0.7, 3)))
 
 
 def floor(draw: Draw) -> Array:
@@ -159,9 +143,8 @@ def crossing(draw: Draw) -> Array:
     one = draw.uniform(0, np.pi)
     other = one + draw.choice([np.pi / 2, draw.uniform(0.3, 2.8)])
     place = draw.uniform(-0.4, 0.4, 2)
-    return np.array(
-        [[place - 2 * toward(angle), place + 2 * toward(angle)] for angle in (one, other)]
-    )
+    ways = [2 * toward(angle) for angle in (one, other)]
+    return np.array([[place - way, place + way] for way in ways])
 
 
 def wedge(draw: Draw) -> Array:
@@ -170,22 +153,14 @@ def wedge(draw: Draw) -> Array:
     return np.array([[tip, tip + 3 * toward(middle + side)] for side in (half, -half)])
 
 
-def loose(draw: Draw) -> Array:
-    return draw.uniform(-1.6, 1.6, (int(draw.integers(2, 5)), 2, 2))
-
-
-def nothing(_draw: Draw) -> Array:
-    return np.zeros((0, 2, 2))
-
-
 LAYOUTS: dict[str, Callable[[Draw], Array]] = {
-    "box": upright_box,
-    "touching": upright_box,
+    "box": lambda _draw: box(CORNER, (1.75, 1.5)),
+    "touching": lambda _draw: box(CORNER, (1.75, 1.5)),
     "tilted_box": tilted_box,
     "crossing": crossing,
     "wedge": wedge,
     "triangle": triangle,
     "floor": floor,
-    "loose": loose,
-    "open": nothing,
+    "loose": lambda draw: draw.uniform(-1.6, 1.6, (int(draw.integers(2, 5)), 2, 2)),
+    "open": lambda _draw: np.zeros((0, 2, 2)),
 }

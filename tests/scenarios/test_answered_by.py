@@ -3,10 +3,6 @@ truth."""
 
 from __future__ import annotations
 
-import sys
-from collections import Counter
-from collections.abc import Callable
-
 import pytest
 
 from crosscheck2d.scenarios.catalogue import SCENARIOS, scenario
@@ -16,7 +12,6 @@ from crosscheck2d.scenarios.truth.exact import (
     EVENT_DRIVEN,
     NOTHING,
     answered_by,
-    computed,
 )
 
 MODELS = {name: answered_by(scenario(name)) for name in SCENARIOS}
@@ -52,24 +47,3 @@ def test_a_scene_that_is_computed_by_events_says_so(monkeypatch: pytest.MonkeyPa
 
 def test_every_scene_names_a_model():
     assert NOTHING not in MODELS.values()
-
-
-@pytest.mark.parametrize(
-    "name", ["head_on_unequal_e09", "bouncing_ball_e1", "cradle_with_gaps", "line_gas"]
-)
-def test_the_closed_form_is_cheaper_than_following_the_collisions(name: str):
-    one = scenario(name)
-    assert one.truth is not None
-
-    assert calls(lambda: one.truth(one.times[[0, -1]])) < 0.5 * calls(lambda: computed(one))
-
-
-def calls(ask: Callable[[], object]) -> int:
-    """How many functions are called, of Python and of libraries."""
-    counted: Counter[str] = Counter()
-    sys.setprofile(lambda _frame, event, _what: counted.update([event]))
-    try:
-        ask()
-    finally:
-        sys.setprofile(None)
-    return counted["call"] + counted["c_call"]

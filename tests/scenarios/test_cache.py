@@ -81,7 +81,7 @@ def test_a_file_that_is_no_cache_is_one_sentence_and_stays(folder: Path, made: l
 
 def test_what_decides_the_answer_decides_the_key():
     keys = {
-        truth_cache.key_of(one, False)
+        truth_cache.key_of(one)
         for one in (
             ONE,
             replace(ONE, duration=3.0),
@@ -93,7 +93,7 @@ def test_what_decides_the_answer_decides_the_key():
         )
     }
     assert len(keys) == 7
-    assert truth_cache.key_of(replace(ONE, name="other", substeps=(3,)), False) in keys
+    assert truth_cache.key_of(replace(ONE, name="other", substeps=(3,))) in keys
 
 
 def test_with_friction_every_field_of_a_scene_decides_the_key():
@@ -104,7 +104,7 @@ def test_with_friction_every_field_of_a_scene_decides_the_key():
         replace(rough, **{name: lines[name] if name in lines else getattr(rough, name) + 2**-10})
         for name in names
     ]
-    keys = {truth_cache.key_of(replace(ONE, scene=scene), False) for scene in (rough, *scenes)}
+    keys = {truth_cache.key_of(replace(ONE, scene=scene)) for scene in (rough, *scenes)}
 
     assert len(keys) == 1 + len(names)
 

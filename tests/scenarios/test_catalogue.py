@@ -38,7 +38,7 @@ def smallest_gap(scene, position):
 def test_there_are_at_least_24_and_each_is_listed_under_its_own_name():
     assert len(SCENARIOS) >= 24
     assert [scenario(name).name for name in SCENARIOS] == list(SCENARIOS)
-    assert set(SCENARIOS) >= RANDOM
+    assert set(SCENARIOS) >= set(RANDOM)
 
 
 @pytest.mark.parametrize("name", SCENARIOS)
@@ -130,13 +130,6 @@ def test_same_seed_same_scene_and_another_seed_another(name):
         assert getattr(one.scene, field).tobytes() == getattr(same.scene, field).tobytes()
     assert (one.scene.position != other.scene.position).any()
     assert (one.seed, other.seed) == (3, 4)
-
-
-def test_other_scenarios_do_not_depend_on_the_seed():
-    for name in set(SCENARIOS) - RANDOM:
-        one, other = scenario(name, 3), scenario(name, 4)
-        assert one.seed is None
-        assert one.scene.position.tobytes() == other.scene.position.tobytes()
 
 
 def test_asteroids_are_drawn_as_the_exercise_says():

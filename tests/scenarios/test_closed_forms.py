@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -68,25 +69,12 @@ def next_events(scene: Scene, x, v):
         side = np.sign((scene.position - point) @ normal)
         gap = np.maximum((x - point) @ normal * side - scene.radius, 0)
         speed, acceleration = v @ normal * side, scene.gravity @ normal * side
+        under = speed**2 - 2 * acceleration * gap
         for i in np.flatnonzero(np.isfinite(scene.mass)):
-            if acceleration[i] < 0:
-                root = np.sqrt(speed[i] ** 2 - 2 * acceleration[i] * gap[i])
-                t = (
-                    2 * gap[i] / (root - speed[i])
-                    if speed[i] < 0
-                    else (speed[i] + root) / -acceleration[i]
-                )
-                found.append((t, i, -1 - w))
-            elif speed[i] < 0 and speed[i] ** 2 > 2 * acceleration[i] * gap[i]:
-                found.append(
-                    (
-                        2
-                        * gap[i]
-                        / (np.sqrt(speed[i] ** 2 - 2 * acceleration[i] * gap[i]) - speed[i]),
-                        i,
-                        -1 - w,
-                    )
-                )
+            if speed[i] < 0 and under[i] > 0:
+                found.append((2 * gap[i] / (np.sqrt(under[i]) - speed[i]), i, -1 - w))
+            elif acceleration[i] < 0:
+                found.append(((speed[i] + np.sqrt(under[i])) / -acceleration[i], i, -1 - w))
     return min(found)
 
 
@@ -102,12 +90,8 @@ def simulate(scene: Scene, until):
             return path
         t, x, v = t + after, x + v * after + g * after**2 / 2, v + g * after
         n = wall_frames(scene)[1][-1 - j] if j < 0 else (x[j] - x[i]) / np.hypot(*(x[j] - x[i]))
-        kick = (
-            (1 + scene.restitution)
-            * ((v[j] if j >= 0 else 0) - v[i])
-            @ n
-            / (w[i] + (w[j] if j >= 0 else 0))
-        )
+        other, weight = (v[j], w[j]) if j >= 0 else (0, 0)
+        kick = (1 + scene.restitution) * (other - v[i]) @ n / (w[i] + weight)
         v[i] += kick * w[i] * n
         if j >= 0:
             v[j] -= kick * w[j] * n
@@ -303,13 +287,7 @@ def test_an_offset_grows_between_static_disks_as_the_horizon_assumes():
     along = np.array([0.8, 0.6])
     start = np.array(scene.position)
     start[0] += 1e-7 * np.array([-0.6, 0.8])
-    moved = Scene(
-        position=start,
-        velocity=scene.velocity,
-        radius=scene.radius,
-        mass=scene.mass,
-        restitution=1.0,
-    )
+    moved = replace(scene, position=start)
     offset = [abs(along[0] * x[0, 1] - along[1] * x[0, 0]) for _, x, _ in simulate(moved, 7.0)][1:]
     # q = 1 + 0.75 / 1.5; after a few bounces only the growing direction is left, while 1e-7 m is
     # still small.

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from crosscheck2d.scenarios.families.placing import lay_out
 from crosscheck2d.scenarios.files import tables
 from crosscheck2d.scenarios.files.scene_file import SceneFileError, read_scene_file, scene_text
 from crosscheck2d.scenarios.files.tables import MOST_WALLS
@@ -136,17 +137,9 @@ def test_touching_disks_are_no_overlap(tmp_path: Path) -> None:
     rows = [(i + 0.5 * (j % 2) + 1e3, j * np.sqrt(0.75)) for i in range(12) for j in range(12)]
     position = 0.2 * np.array(rows)
     floor = [[[200.0, -0.1], [210.0, -0.1]]]
-    n = len(rows)
-    scene = Scene(
-        position=position,
-        velocity=np.zeros((n, 2)),
-        radius=np.full(n, 0.1),
-        mass=np.ones(n),
-        restitution=0.5,
-        walls=np.array(floor),
-    )
+    scene = lay_out(position, radius=0.1, restitution=0.5, walls=floor)
     path.write_text(scene_text(Scenario("heap", "?", "here", scene, 1.0, 0.1)), newline="\n")
-    assert read_scene_file(path).scene.n == n
+    assert read_scene_file(path).scene.n == len(rows)
 
 
 def test_a_file_reads_as_it_is_written() -> None:

@@ -9,14 +9,15 @@ import pytest
 
 from crosscheck2d.adapters.event_driven.engine import EventDriven
 from crosscheck2d.adapters.play import play
-from crosscheck2d.scenarios.catalogue import FAMILIES, scenario
+from crosscheck2d.scenarios.catalogue import scenario
+from crosscheck2d.scenarios.families.friction import FRICTION
 from crosscheck2d.scenarios.families.placing import lay_out
 from crosscheck2d.scenarios.model import Scenario, Trajectory
 from crosscheck2d.scenarios.truth.closed_forms import Legs
 from crosscheck2d.scenarios.truth.exact import OracleTruth, computed
 from crosscheck2d.scenarios.truth.sliding import bounced, slide
 
-NAMES = [name for name in FAMILIES["Friction"] if not isinstance(scenario(name).truth, OracleTruth)]
+NAMES = [one.name for one in FRICTION if not isinstance(one.truth, OracleTruth)]
 FIELDS = ("position", "velocity", "angle", "angular_velocity")
 
 

@@ -17,6 +17,7 @@ from crosscheck2d.reports.run.comparing import compute_record, record_of
 from crosscheck2d.reports.run.pool import run_all
 from crosscheck2d.scenarios.catalogue import scenario
 from crosscheck2d.scenarios.families.placing import box, lay_out
+from crosscheck2d.scenarios.files.scene_file import scene_text
 from crosscheck2d.scenarios.model import Scenario
 from crosscheck2d.scenarios.no_truth import NoTruth
 from crosscheck2d.scenarios.truth import cache as truth_cache
@@ -24,29 +25,14 @@ from crosscheck2d.scenarios.truth import exact as oracle
 from crosscheck2d.scenarios.truth.exact import computed, with_oracle
 from crosscheck2d.scenarios.truth.oracle import path as oracle_path
 from crosscheck2d.scenarios.truth.oracle.events import trace
-from crosscheck2d.scenarios.truth.oracle.numbers import Undecided, balls, digits, has_balls
+from crosscheck2d.scenarios.truth.oracle.numbers import Undecided, balls, mpfr
 from crosscheck2d.scenarios.truth.oracle.path import TimeLimit
 from crosscheck2d.scenarios.truth.record import TruthRecord
 from tests.reports.terminal.command_line import crosscheck
 
 REASON, CUT = "the limit of 5 s was reached", 20.0
-KINDS = [None, digits] if has_balls() else [digits]
-LONG = """\
-name = "long"
-duration = 1000000
-sample_interval = 1
-substeps = [1]
-restitution = 1.0
-gravity = [0.0, 0.0]
-[box]
-low = [-0.5, -0.5]
-high = [0.5, 0.5]
-[[disk]]
-position = [0, 0]
-velocity = [-2.1938145353255925, 2.084602421623396]
-radius = 0.3
-mass = 1.0
-"""
+KINDS = [None, mpfr]
+LONG = lay_out([[0, 0]], [-2.19, 2.08], radius=0.3, walls=box([-0.5] * 2, [0.5] * 2))
 
 
 def boxed(speed: float = 1.1) -> Scenario:
@@ -90,9 +76,9 @@ def test_an_answer_that_time_ends_is_the_beginning_of_the_whole_one(kind: Callab
 
 @pytest.mark.usefixtures("ticking")
 def test_a_last_place_in_the_start_is_another_beginning():
-    short = computed(boxed(float(np.nextafter(1.1, 2))), digits, TimeLimit(CUT, REASON))
+    short = computed(boxed(float(np.nextafter(1.1, 2))), mpfr, TimeLimit(CUT, REASON))
 
-    assert not begins_as(short, computed(boxed(), digits))
+    assert not begins_as(short, computed(boxed(), mpfr))
 
 
 @pytest.mark.usefixtures("ticking")
@@ -111,7 +97,6 @@ def test_what_is_given_of_a_chaotic_motion_is_exact(kind: Callable, seconds: flo
     assert short.error_bound <= 1e-9 * one.scene.radius.min()
 
 
-@pytest.mark.skipif(not has_balls(), reason="needs python-flint")
 @pytest.mark.usefixtures("ticking")
 def test_more_time_never_gives_less():
     one = scenario("line_gas")
@@ -124,7 +109,6 @@ def test_more_time_never_gives_less():
     assert reached[0] < reached[-1]
 
 
-@pytest.mark.skipif(not has_balls(), reason="needs python-flint")
 def test_an_answer_ends_before_its_balls_are_too_wide():
     one, accuracy = scenario("line_gas"), 1e-12
     with pytest.raises(Undecided) as lost:
@@ -142,11 +126,11 @@ def test_what_depends_on_the_machine_is_not_kept(tmp_path: Path, monkeypatch: py
     monkeypatch.setenv("CROSSCHECK_CACHE", str(tmp_path))
     one = boxed()
     record_of(one, TimeLimit(CUT, REASON))
-    assert truth_cache.look_up(truth_cache.key_of(one, has_balls())) is None
+    assert truth_cache.look_up(truth_cache.key_of(one)) is None
 
     whole = record_of(one)
     assert whole.reason == ""
-    assert truth_cache.look_up(truth_cache.key_of(one, has_balls())) is not None
+    assert truth_cache.look_up(truth_cache.key_of(one)) is not None
     assert record_of(one, TimeLimit(0.0, REASON)).horizon == whole.horizon  # it is there already
 
 
@@ -179,7 +163,8 @@ def test_an_endless_scene_is_answered_up_to_the_limit_of_time(
     monkeypatch.setattr(truth, "compute_record", by_processor_time)
     # on a busy machine 6 s of work take longer than 6 s
     monkeypatch.setattr(truth, "run_all", lambda tasks, workers, _: run_all(tasks, workers, 300.0))
-    (tmp_path / "long.toml").write_text(LONG)
+    long = Scenario("long", "?", "", LONG, 1e6, 1.0, (1,))
+    (tmp_path / "long.toml").write_text(scene_text(long))
     done = crosscheck("truth", "long.toml", "--timeout", "6", "--json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     said = json.loads(done.stdout)

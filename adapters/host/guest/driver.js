@@ -39,11 +39,7 @@ Object.defineProperty(globalThis, "__host", { value: (() => {
 
   // What a package for browsers asks for.
   const quiet = () => undefined;
-  globe.console = {};
-  for (const name of ["log", "info", "warn", "error", "debug", "table", "assert", "clear", "count", "countReset", "dir",
-    "dirxml", "group", "groupCollapsed", "groupEnd", "time", "timeEnd", "timeLog", "timeStamp", "trace"]) {
-    globe.console[name] = quiet;
-  }
+  globe.console = new Proxy({}, { get: () => quiet });
   if (typeof performance === "undefined") globe.performance = { now: () => 0 };
   if (typeof TextDecoder === "undefined") {
     globe.TextDecoder = class {
@@ -93,21 +89,20 @@ Object.defineProperty(globalThis, "__host", { value: (() => {
   // The built-ins, and what each has.
   function snapshot() {
     const values = setPrototypeOf({}, null), names = keys(BUILT_IN);
-    for (let k = 0; k < names.length; k++) values[names[k]] = globe[names[k]];
+    const remember = (path, holder) => {
+      const own = holder ? ownKeys(holder) : [];
+      for (let k = 0; k < own.length; k++) {
+        const described = setPrototypeOf(getOwnPropertyDescriptor(holder, own[k]), null);
+        const name = typeof own[k] === "symbol" ? apply(symbolText, own[k], []) : own[k];
+        values[path + "." + name] = described.value || described.get;
+      }
+    };
     for (let k = 0; k < names.length; k++) {
-      remember(values, names[k], BUILT_IN[names[k]]);
-      if (BUILT_IN[names[k]].prototype) remember(values, names[k] + ".prototype", BUILT_IN[names[k]].prototype);
+      values[names[k]] = globe[names[k]];
+      remember(names[k], BUILT_IN[names[k]]);
+      remember(names[k] + ".prototype", BUILT_IN[names[k]].prototype);
     }
     return values;
-  }
-
-  function remember(values, path, holder) {
-    const own = ownKeys(holder);
-    for (let k = 0; k < own.length; k++) {
-      const described = setPrototypeOf(getOwnPropertyDescriptor(holder, own[k]), null);
-      const name = typeof own[k] === "symbol" ? apply(symbolText, own[k], []) : own[k];
-      values[path + "." + name] = described.value || described.get;
-    }
   }
 
   function differences(before, after) {
@@ -123,20 +118,18 @@ Object.defineProperty(globalThis, "__host", { value: (() => {
     const names = keys(file);
     for (let k = 0; k < names.length; k++) found += `${stringify(names[k])}:${typeof file[names[k]] === "function"},`;
     const models = typeof file.models === "string" ? stringify(file.models) : "null";
-    return `{${found}"models":${models},"replaced":[${list(differences(original, snapshot()))}]}`;
+    return `{${found}"models":${models},"replaced":${list(differences(original, snapshot()), word, 9)}}`;
   }
 
-  function list(names) {
-    let text = "";
-    for (let k = 0; k < names.length && k < 9; k++) text += (k ? "," : "") + stringify("" + names[k]);
-    return text;
-  }
-
-  const joined = (lines) => {
+  // JSON of an array, of which each value is written by a function.
+  function list(values, write, most = values.length) {
     let all = "";
-    for (let k = 0; k < lines.length; k++) all += (k ? "," : "") + lines[k];
+    for (let k = 0; k < values.length && k < most; k++) all += (k ? "," : "") + write(values[k]);
     return "[" + all + "]";
-  };
+  }
+
+  const joined = (lines) => list(lines, (line) => line);
+  const word = (name) => stringify("" + name);
   const text = (x) => (typeof x === "number" ? "" + x : "NaN");
   const number = (x) => (typeof x === "number" ? x : NaN);
 
@@ -153,16 +146,11 @@ Object.defineProperty(globalThis, "__host", { value: (() => {
     if (!s.position || !s.velocity || !s.force) {
       throw new TypeError("a sphere is left with a position, velocity or force that has no x and y");
     }
-    return "[" + text(s.position.x) + "," + text(s.position.y) + "," + text(s.velocity.x) + "," + text(s.velocity.y)
-      + "," + text(s.force.x) + "," + text(s.force.y) + "," + text(s.alpha) + "," + text(s.angularVelocity)
-      + "," + text(s.torque) + "," + text(s.mass) + "," + text(s.MoI) + "," + text(s.size) + "]";
+    return [s.position.x, s.position.y, s.velocity.x, s.velocity.y, s.force.x, s.force.y,
+      s.alpha, s.angularVelocity, s.torque, s.mass, s.MoI, s.size];
   }
 
-  function rows(all) {
-    const lines = empty();
-    for (let i = 0; i < all.length; i++) lines[i] = row(all[i]);
-    return joined(lines);
-  }
+  const rows = (all) => list(all, (s) => list(row(s), text));
 
   function everybody() {
     const all = empty(), others = file.asteroids();
@@ -186,14 +174,10 @@ Object.defineProperty(globalThis, "__host", { value: (() => {
   }
 
   function strange(all) {
-    const names = empty();
+    const names = empty(), known = setPrototypeOf(sphere(empty()), null);
     for (let i = 0; i < all.length; i++) {
       const own = keys(all[i]);
-      for (let k = 0; k < own.length; k++) {
-        let known = false;
-        for (let f = 0; f < FIELDS.length; f++) known = known || FIELDS[f] === own[k];
-        if (!known) names[names.length] = own[k];
-      }
+      for (let k = 0; k < own.length; k++) if (!(own[k] in known)) names[names.length] = own[k];
     }
     return names;
   }
@@ -208,13 +192,15 @@ Object.defineProperty(globalThis, "__host", { value: (() => {
   // Put functions that write down each call in the place of the file's own; a `const` one stays, and is not seen.
   function watch(calls) {
     const index = (s) => { for (let k = 0; k < spheres.length; k++) if (spheres[k] === s) return k; return -1; };
-    const { integrate, collide, wrap } = file;
     const noted = (called, line) => (...given) => {
       calls[calls.length] = line(given[0], given[1]);
       return apply(called, undefined, given);
     };
-    file.watch(noted(integrate, (s, dt) => `["integrate",${index(s)},${text(dt)}]`),
-      noted(collide, (a, b) => `["collide",${index(a)},${index(b)}]`), noted(wrap, () => '["wrap"]'));
+    file.watch({
+      integrate: noted(file.integrate, (s, dt) => `["integrate",${index(s)},${text(dt)}]`),
+      collide: noted(file.collide, (a, b) => `["collide",${index(a)},${index(b)}]`),
+      wrap: noted(file.wrap, () => '["wrap"]'),
+    });
   }
 
   function call(what, on) {
@@ -250,8 +236,8 @@ Object.defineProperty(globalThis, "__host", { value: (() => {
       }
     } catch (error) { problem = described(error); }
     const strayed = !question.world && witness() !== known;
-    return `{"states":${joined(states)},"returned":${returned},"strayed":${strayed},"strange":[${list(strange(spheres))}],`
-      + `"kept":[${list(differences(before, globals()))}],"calls":${joined(calls)},"error":${problem}}`;
+    return `{"states":${joined(states)},"returned":${returned},"strayed":${strayed},"strange":${list(strange(spheres), word, 9)},`
+      + `"kept":${list(differences(before, globals()), word, 9)},"calls":${joined(calls)},"error":${problem}}`;
   }
 
   // Questions, one after the other. What comes before a call that never comes back can still be had of `answers`.
@@ -323,10 +309,9 @@ Object.defineProperty(globalThis, "__host", { value: (() => {
         note(i, j, sign * a.mass * sqrt(du * du + dv * dv));
       }
       if ((kicked || moved || overlaps) && contacts.length < MOST) {
-        contacts[contacts.length] = `[${steps},${i},${j},${text(ax)},${text(ay)},${text(au)},${text(av)},`
-          + `${text(bx)},${text(by)},${text(bu)},${text(bv)},`
-          + `${text(a.position.x)},${text(a.position.y)},${text(a.velocity.x)},${text(a.velocity.y)},`
-          + `${text(b.position.x)},${text(b.position.y)},${text(b.velocity.x)},${text(b.velocity.y)}]`;
+        contacts[contacts.length] = list([steps, i, j, ax, ay, au, av, bx, by, bu, bv,
+          a.position.x, a.position.y, a.velocity.x, a.velocity.y,
+          b.position.x, b.position.y, b.velocity.x, b.velocity.y], text);
       }
     }
 
@@ -351,11 +336,8 @@ Object.defineProperty(globalThis, "__host", { value: (() => {
       },
       read(into, at) {
         for (let i = 0; i < n; i++, at += WIDTH) {
-          const s = all[i];
-          row(s);  // throws if it has no x and y
-          into[at] = number(s.position.x); into[at + 1] = number(s.position.y);
-          into[at + 2] = number(s.velocity.x); into[at + 3] = number(s.velocity.y);
-          into[at + 4] = number(s.alpha); into[at + 5] = number(s.angularVelocity);
+          const r = row(all[i]);
+          for (let k = 0; k < WIDTH; k++) into[at + k] = number(r[k < 4 ? k : k + 2]);
         }
       },
     };
@@ -537,20 +519,20 @@ Object.defineProperty(globalThis, "__host", { value: (() => {
   }
 
   // Puts the readings and the new collisions into `numbers`, and says how many readings there are.
-  function handed(readings) {
+  function handed(readings, thrown = "null") {
     const width = WIDTH * world.n;
     numbers = new Numbers(width * readings.length + log.length);
     let at = 0;
     for (let k = 0; k < readings.length; k++) for (let i = 0; i < width; i++) numbers[at++] = readings[k][i];
     for (let k = 0; k < log.length; k++) numbers[at++] = log[k];
     log = empty();
-    return readings.length;
+    return `{"readings":${readings.length},"thrown":${thrown}}`;
   }
 
   // Some calls of `step`, then where everything is: one request for all.
   function play(calls) {
     for (let k = 0; k < calls.length; k++) step(calls[k]);
-    return `{"readings":${handed([reading()])},"thrown":null}`;
+    return handed([reading()]);
   }
 
   // `times` readings, each after `count` steps, or those before something is thrown, which is reported; fewer if they take
@@ -569,7 +551,7 @@ Object.defineProperty(globalThis, "__host", { value: (() => {
         readings[readings.length] = reading();
       }
     } catch (error) { thrown = reportOf(error); }
-    return `{"readings":${handed(readings)},"thrown":${thrown}}`;
+    return handed(readings, thrown);
   }
 
   // The forces of a step with a thrust; that of a body's frame is turned by the angle of the disk.
@@ -597,7 +579,7 @@ Object.defineProperty(globalThis, "__host", { value: (() => {
       step(steps);
       readings[k + 1] = reading();
     }
-    return `{"readings":${handed(readings)},"thrown":null}`;
+    return handed(readings);
   }
 
   function described(error) {

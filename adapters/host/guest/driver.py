@@ -169,7 +169,15 @@ def sphere_of(r: Sequence[float]) -> Fields:
     return Fields(**vectors, **dict(zip(SCALARS, r[6:])))
 
 
-NAMES = frozenset(vars(sphere_of([0.0] * 12)))
+NAMES = frozenset((*VECTORS, *SCALARS))
+
+
+def put(sphere: Any, r: Sequence[float]) -> None:
+    for name, x, y in zip(VECTORS, r[:6:2], r[1:6:2]):
+        vector = getattr(sphere, name)
+        vector.x, vector.y = x, y
+    for name, x in zip(SCALARS, r[6:]):
+        setattr(sphere, name, x)
 
 
 def row_of(s: Any) -> list[float]:
@@ -181,6 +189,10 @@ def row_of(s: Any) -> list[float]:
             "a sphere is left with a position, velocity or force that has no x and y"
         ) from None
     return [*map(number, numbers), *(number(getattr(s, name)) for name in SCALARS)]
+
+
+def everybody(module: ModuleType) -> list[Any]:
+    return [module.ufo, *module.asteroids]
 
 
 def number(x: Any) -> float:
@@ -328,16 +340,11 @@ def as_functions(module: ModuleType) -> dict[str, Callable[..., Any]]:
         try:
             module.advance(disks, where, dt, 1)
         finally:  # the state at a failure is judged, too
-            for k, s in enumerate(spheres):
-                s.position.x, s.position.y = map(float, disks.position[k])
-                s.velocity.x, s.velocity.y = map(float, disks.velocity[k])
-                s.force.x, s.force.y = map(float, disks.force[k])
-                s.alpha, s.angularVelocity = float(disks.angle[k]), float(disks.angular_velocity[k])
-                s.torque, s.size = float(disks.torque[k]), float(disks.radius[k])
-                s.mass, s.MoI = float(disks.mass[k]), float(disks.inertia[k])
-
-    def everybody() -> list[Any]:
-        return [module.ufo, *module.asteroids]
+            d = disks
+            turning = (d.angle, d.angular_velocity, d.torque, d.mass, d.inertia, d.radius)
+            after = np.column_stack([d.position, d.velocity, d.force, *turning])
+            for s, row in zip(spheres, after.tolist()):
+                put(s, row)
 
     def begin() -> None:
         places = [(-4.0 + 2.0 * (k % 5), -2.2 + 1.2 * (k // 5)) for k in range(20)]
@@ -348,18 +355,19 @@ def as_functions(module: ModuleType) -> dict[str, Callable[..., Any]]:
     return {
         "integrate": lambda sphere, dt: act([sphere], world, dt),
         "collide": lambda a, b: act([a, b], world, 0.0),
-        "simulate": lambda dt: act(everybody(), boxed, dt),
-        "wrap": lambda: act(everybody(), boxed, 0.0),
+        "simulate": lambda dt: act(everybody(module), boxed, dt),
+        "wrap": lambda: act(everybody(module), boxed, 0.0),
         "begin": begin,
     }
 
 
 class EngineWorld:
     def __init__(self, guest: PythonGuest, scene: dict[str, Any]) -> None:
-        self.guest, self.n, self.walls = guest, scene["n"], len(scene["walls"])
+        self.np, self.guest = import_module("numpy"), guest
+        self.n, self.walls = scene["n"], len(scene["walls"])
         self.dt, self.angle = scene["dt"], list(scene["angle"])
         self.steps, self.log = 0, array.array("d")
-        self.first: list[list[float]] = []  # what was read first
+        self.first: Any = None  # what was read first
         self.renews: bool | None = None  # whether a step returns a new world
         self.hears = scene["listening"] and "collisions" in guest.file
         self.world = self.call("create", Fields(**scene), self.dt)
@@ -392,8 +400,8 @@ class EngineWorld:
             return True
         except Exception:
             now, first = self.rows_of(self.world), self.first
-        still = first and [d[:2] for d in now] == [d[:2] for d in first]
-        if still and any(any(d[2:4]) for d in now):
+        still = first is not None and (now[:, :2] == first[:, :2]).all()
+        if still and now[:, 2:4].any():
             wanted = "it changes its world, or returns a new one that read can read"
             raise wrong("step", result, f"expected is that {wanted}", " and moved no disk")
         return False
@@ -414,45 +422,37 @@ class EngineWorld:
 
     def read(self) -> array.array[float]:
         rows = self.rows_of(self.world)
-        self.first = self.first or rows
-        return array.array("d", [x for disk in rows for x in disk])
+        self.first = rows if self.first is None else self.first
+        return array.array("d", rows.ravel().tolist())
 
-    def rows_of(self, world: Any) -> list[list[float]]:
-        state = self.call("read", world)
-        rows = [self.column(state, name, 2) for name in ("position", "velocity")]
+    def rows_of(self, world: Any) -> Any:
+        state, n = self.call("read", world), self.n
+        columns = [self.column(state, name, (n, 2)) for name in ("position", "velocity")]
         if self.guest.turns:
-            rows += [self.column(state, name, 1) for name in ("angle", "angular_velocity")]
+            columns += [self.column(state, name, (n,)) for name in ("angle", "angular_velocity")]
         else:
-            rows += [[[x] for x in self.angle], [[0.0]] * self.n]
-        return [[x for values in disk for x in values] for disk in zip(*rows)]
+            columns += [self.angle, self.np.zeros(n)]
+        return self.np.column_stack(columns)
 
-    def column(self, state: Any, name: str, width: int) -> list[list[float]]:
-        wanted = f"expected is {'[x, y]' if width == 2 else 'a number'} for each of {self.n} disks"
+    def column(self, state: Any, name: str, shape: tuple[int, ...]) -> Any:
+        each = "[x, y]" if len(shape) == 2 else "a number"
+        wanted = f"expected is {each} for each of {self.n} disks"
         value = state.get(name) if isinstance(state, dict) else getattr(state, name, None)
         if value is None:
             raise wrong("read", state, f"it has no {name}; {wanted}")
-        if hasattr(value, "tolist"):
-            value = value.tolist()
-        if not isinstance(value, (list, tuple)) or len(value) != self.n:
-            if self.guest.loads > 1 and isinstance(value, (list, tuple)) and len(value) > self.n:
-                wanted += "; create keeps disks of the scene before"
-            raise wrong("read", value, wanted, f" as {name}")
-        column = []
+        value = value.tolist() if hasattr(value, "tolist") else value
         try:
-            for i, disk in enumerate(value):
-                disk = disk.tolist() if hasattr(disk, "tolist") else disk
-                numbers = [disk] if width == 1 else disk
-                if not isinstance(numbers, (list, tuple)) or len(numbers) != width:
-                    raise TypeError
-                if any(isinstance(x, (str, bool, complex)) for x in numbers):
-                    raise TypeError
-                column.append([float(x) for x in numbers])
-                if not all(abs(x) < inf for x in column[-1]):
-                    where = f" as {name} of disk {i}"
-                    raise wrong("read", disk, "expected are finite numbers", where, "diverged")
+            numbers = self.np.array(value)
         except (TypeError, ValueError):
             raise wrong("read", value, wanted, f" as {name}") from None
-        return column
+        if numbers.dtype.kind not in "iuf" or numbers.shape != shape:
+            if self.guest.loads > 1 and numbers.ndim and len(numbers) > self.n:
+                wanted += "; create keeps disks of the scene before"
+            raise wrong("read", value, wanted, f" as {name}")
+        if (odd := self.np.argwhere(~self.np.isfinite(numbers))).size:
+            disk, where = numbers[odd[0, 0]].tolist(), f" as {name} of disk {odd[0, 0]}"
+            raise wrong("read", disk, "expected are finite numbers", where, "diverged")
+        return numbers
 
 
 def wrong(function: str, value: Any, wanted: str, what: str = "", kind: str = "error") -> Failed:
@@ -489,7 +489,7 @@ class PythonGuest:
         self.order, folder = order, order["folder"] or ""
         self.name = os.path.join(folder, order["name"])
         self.neighbours = Neighbours(dict(order["imported"]), folder)
-        self.inside = ""
+        self.inside, self.replaced = "", list[str]()
         self.versions = {"python": ".".join(map(str, sys.version_info[:3]))}
         sys.meta_path.insert(0, self.neighbours)
         self.renew()
@@ -523,14 +523,11 @@ class PythonGuest:
         else:
             self.world_of = ExerciseWorld
             self.file = {k: names[f] for k, f in EXERCISE.items() if callable(names.get(f))}
-        models = names["models"] if isinstance(names.get("models"), str) else None
-        self.turns = "rotation" in (models or "").split()
-        self.functions: dict[str, Any] = {
-            **{name: name in self.file for name in (*EXERCISE, *ENGINE)},
-            "replaced": [],
-            "models": models,
-            "advance": self.world_of is ArraysWorld,
-        }
+        models = names.get("models")
+        self.models = models if isinstance(models, str) else None
+        self.turns = "rotation" in (self.models or "").split()
+        self.functions = {name: name in self.file for name in (*EXERCISE, *ENGINE)}
+        self.functions["advance"] = self.world_of is ArraysWorld
 
     def methods_of(self, holder: type) -> dict[str, Any]:
         create = vars(holder)["create"]
@@ -550,14 +547,11 @@ class PythonGuest:
     def guarded(self, limit: float, when: str) -> Iterator[None]:
         """Context that turns every exception of the file into `Failed`, and stops it after
         `limit` s of processor time, or `PATIENCE` times as many by the clock."""
-
         began = process_time()
-
-        def too_late() -> Failed:
-            return stopped(limit, process_time() - began, when)
-
         try:
-            with system.stopped_after(limit, PATIENCE * limit, too_late):
+            with system.stopped_after(
+                limit, PATIENCE * limit, lambda: stopped(limit, process_time() - began, when)
+            ):
                 yield
         except BaseException as error:  # SystemExit too: a guest may not end the process
             failure = error if isinstance(error, Failed) else self.failure(error, when)
@@ -600,12 +594,9 @@ class PythonGuest:
         if "begin" in self.file:
             self.file["begin"]()
 
-    def everybody(self) -> list[Any]:
-        return [self.module.ufo, *self.module.asteroids]
-
     def globals(self) -> list[list[float]] | None:
         try:
-            return [row_of(s) for s in self.everybody()]
+            return [row_of(s) for s in everybody(self.module)]
         except (AttributeError, TypeError):
             return None
 
@@ -628,7 +619,7 @@ class PythonGuest:
                     )
                 returned = returned or isinstance(result, (Fields, dict, list, tuple))
                 returned = returned or hasattr(result, "position")
-                spheres = self.everybody() if question["world"] else spheres
+                spheres = everybody(self.module) if question["world"] else spheres
                 states.append([row_of(s) for s in spheres])
         except (Failed, system.TimeIsUp):
             raise
@@ -701,17 +692,11 @@ class PythonGuest:
         return Traced(access, vars(sphere))
 
     def placed(self, question: dict[str, Any]) -> list[Any]:
-        made = [sphere_of(r) for r in question["spheres"]]
         if not question["world"]:
-            return made
-        spheres = self.everybody()
-        for mine, wanted in zip(spheres, made):
-            for name, value in vars(wanted).items():
-                if isinstance(value, Fields):
-                    vector = getattr(mine, name)
-                    vector.x, vector.y = value.x, value.y
-                else:
-                    setattr(mine, name, value)
+            return [sphere_of(r) for r in question["spheres"]]
+        spheres = everybody(self.module)
+        for sphere, r in zip(spheres, question["spheres"]):
+            put(sphere, r)
         return spheres
 
     # ---- whole scenes
@@ -734,22 +719,18 @@ class PythonGuest:
     def play(self, calls: list[dict[str, Any]]) -> dict[str, Any]:
         for step in calls:
             self.step(step)
-        return self.handed([self.world.read()])
+        return self.samples({"times": 0})
 
     def samples(self, argument: dict[str, Any]) -> dict[str, Any]:
-        readings = [self.world.read()]
+        numbers = self.world.read()
         for _ in range(argument["times"]):
             self.step(argument["step"])
-            readings.append(self.world.read())
-        return self.handed(readings)
-
-    def handed(self, readings: list[array.array[float]]) -> dict[str, Any]:
-        numbers = array.array("d")
-        for rows in (*readings, self.world.log[self.heard :]):
-            numbers.extend(rows)
+            numbers.extend(self.world.read())
+        numbers.extend(self.world.log[self.heard :])
         self.heard = len(self.world.log)
         packed = b64encode(numbers.tobytes()).decode("ascii")
-        return {"readings": len(readings), "thrown": None, "numbers": packed, "seconds": 0.0}
+        readings = argument["times"] + 1
+        return {"readings": readings, "thrown": None, "numbers": packed, "seconds": 0.0}
 
     def contacts(self) -> list[list[float]]:
         return getattr(self.world, "contacts", [])
@@ -798,8 +779,8 @@ def serve(lines: queue.SimpleQueue[bytes], answers: int) -> None:
                 guest = PythonGuest(order)
             else:
                 guest = sys.modules["v8"].V8Guest(order)
-            hello = {"functions": guest.functions, "versions": guest.versions}
-            tell(answers, {"id": request["id"], **hello})
+            told = ("functions", "models", "replaced", "versions")
+            tell(answers, {"id": request["id"]} | {name: getattr(guest, name) for name in told})
         except Failed as failure:
             tell(answers, {"id": request["id"], "failed": vars(failure)})
             return

@@ -32,15 +32,13 @@ VERBS = ", ".join(
     f'{verb}: typeof {name} === "undefined" ? null : {name}'
     for verb, name in [*EXERCISE.items(), *zip(ENGINE, ENGINE)]
 )
-BIND = f"""__host("bind", {{ {VERBS},
-  ufo: () => ufo, asteroids: () => asteroids,
-  watch: (i, c, w) => {{
-    try {{ if (typeof integrate === "function") integrate = i; }} catch (_) {{}}
-    try {{
-      if (typeof sphereSphereCollisionHandling === "function") sphereSphereCollisionHandling = c;
-    }} catch (_) {{}}
-    try {{ if (typeof projectObjects === "function") projectObjects = w; }} catch (_) {{}}
-  }},
+WATCH = " ".join(
+    f'try {{ if (typeof {name} === "function") {name} = by.{verb}; }} catch (_) {{}}'
+    for verb, name in EXERCISE.items()
+    if verb in ("integrate", "collide", "wrap")
+)
+BIND = f"""__host("bind", {{
+  {VERBS}, ufo: () => ufo, asteroids: () => asteroids, watch: (by) => {{ {WATCH} }},
 }})"""
 # A class has the functions of an engine, of itself or of its instances.
 BIND_CLASS = """__host("bind", ((engine) => {{
@@ -93,8 +91,9 @@ class V8Guest:
             self.eval(f"{self.order['text']}\n//# sourceURL={NAME}")
             bind = BIND_CLASS.format(self.order["holder"]) if self.order["holder"] else BIND
             self.functions = json.loads(str(self.eval(bind)))
+            self.models, self.replaced = map(self.functions.pop, ("models", "replaced"))
             if self.order["engine"]:
-                turns = "rotation" in (self.functions["models"] or "").split()
+                turns = "rotation" in (self.models or "").split()
                 self.v8.eval(f'__host("turns", {json.dumps(turns)})')
             until = monotonic() + self.load_limit
             while not self.v8.eval('__host("ready")'):  # V8 compiles WebAssembly in its own time

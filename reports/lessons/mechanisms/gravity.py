@@ -30,7 +30,7 @@ from crosscheck2d.reports.lessons.mechanisms.ablation import (
     unswept,
 )
 from crosscheck2d.reports.page.style import TRUTH, number
-from crosscheck2d.scenarios.families.walls import bouncing_ball_e1
+from crosscheck2d.scenarios.catalogue import SCENARIOS
 from crosscheck2d.scenarios.model import Array, Scene
 
 NAMES = (NO_CCD, "box2d:matched", NO_CORRECTION, PLAIN, ABLATED)
@@ -39,7 +39,7 @@ ORDERS = {"as the exercise": EXERCISE, "aimed before gravity": PYMUNK, "aimed af
 
 def show_gravity(order: str, k: int) -> Shown:
     """The height of a ball that should bounce for ever."""
-    scenario = bouncing_ball_e1()
+    scenario = SCENARIOS["bouncing_ball_e1"]
     makes = {**unswept(), **uncorrected(), **ablated(order=ORDERS[order])}
     played = Simulation.by(scenario, NAMES, k, makes)
     chart = played.over_time("Height of the centre", "m", lambda each: each.position[:, 0, 1])

@@ -1,2 +1,1 @@
-"""The oracle: an event-driven computation in many digits, certified where intervals are
-installed."""
+"""The oracle: an event-driven computation in many digits, certified by intervals."""

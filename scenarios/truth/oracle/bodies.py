@@ -98,10 +98,8 @@ class Bodies:
         if self.turning:
             turns = np.zeros((len(ends) + scene.n, 3))
             turns[: scene.n, :2] = np.stack([scene.angle, scene.angular_velocity], axis=-1)
-            self.legs = [
-                leg._replace(turn=Turn(*map(exact, turn)))
-                for leg, turn in zip(self.legs, turns.tolist())
-            ]
+            rotations = [Turn(*map(exact, turn)) for turn in turns.tolist()]
+            self.legs = [leg._replace(turn=turn) for leg, turn in zip(self.legs, rotations)]
         self.kind = [FALLING if moves else STATIC for moves in still] + [STATIC] * len(ends)
         if not scene.gravity.any():
             self.kind = [STATIC] * len(self.legs)
@@ -178,12 +176,8 @@ class Bodies:
         if self.shape[i] == STRAIGHT:
             return leg.x + leg.vx * s, leg.y + leg.vy * s, leg.vx, leg.vy
         ux, uy = leg.ax * s, leg.ay * s
-        return (
-            leg.x + (leg.vx + ux / 2) * s,
-            leg.y + (leg.vy + uy / 2) * s,
-            leg.vx + ux,
-            leg.vy + uy,
-        )
+        x, y = leg.x + (leg.vx + ux / 2) * s, leg.y + (leg.vy + uy / 2) * s
+        return x, y, leg.vx + ux, leg.vy + uy
 
     def pushed(self, leg: Leg, now: Number) -> tuple[Number, Number, Number, Number]:
         s, k, turn = now - leg.t, self.k, leg.turn
@@ -251,11 +245,8 @@ class Bodies:
         v, rolls = self.velocity_at(i, now), bool(self.held[i]) and not self.sliding[i]
         turns = any(p.frame == "body" and p.force.any() for p in thrusts)
         self.jet[i] = (jet[0], jet[1]) if turns else None
-        held = tuple(
-            c
-            for c in self.held[i]
-            if c.kind == "wall" and self.k.sign(self.outward(c, a[0], a[1])) < 0
-        )
+        walls = [c for c in self.held[i] if c.kind == "wall"]
+        held = tuple(c for c in walls if self.k.sign(self.outward(c, *a)) < 0)
         self.hold(i, now, held, v, rolls)
         self.asleep[i] = turns  # contacts of such a disk are found by `probe`
         # The walls on which it rested still touch it.
@@ -341,10 +332,8 @@ class Bodies:
         """
         i, k, w = contact.i, self.k, self.law.inverse_mass[contact.i]
         # All per mass: 1 m/s2 of friction changes the slip by `inverse_effective_mass` m/s2.
-        inverse_effective_mass, most = (
-            1 + friction.rim_inverse_mass(i) / w,
-            friction.coefficient * load,
-        )
+        inverse_effective_mass = 1 + friction.rim_inverse_mass(i) / w
+        most = friction.coefficient * load
         driven = along + contact.side * self.radius[i] * self.rates[i]
         if self.sliding[i]:
             force = -self.sliding[i] * most

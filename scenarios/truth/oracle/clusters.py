@@ -45,19 +45,11 @@ def complementary(
         if solution is None:
             return None
         forces = dict(zip(active, solution))
-        wrong = next(
-            (
-                a
-                for a in range(len(q))
-                if k.sign(
-                    forces[a]
-                    if a in forces
-                    else q[a] + sum(matrix[a][b] * force for b, force in forces.items())
-                )
-                < 0
-            ),
-            None,
+        speeds = (
+            q[a] + sum(matrix[a][b] * force for b, force in forces.items()) for a in range(len(q))
         )
+        values = (forces.get(a, speed) for a, speed in enumerate(speeds))
+        wrong = next((a for a, value in enumerate(values) if k.sign(value) < 0), None)
         if wrong is None:
             return {a: force for a, force in forces.items() if k.sign(force)}
         active = sorted({*active} ^ {wrong})

@@ -26,6 +26,8 @@ class ContactFinder:
         self.bodies, self.k, self.scene = bodies, bodies.k, bodies.scene
         most = len(bodies.legs) + 2 * len(bodies.walls)
         self.bounds, self.codes = np.empty(most), np.empty(most, np.int64)
+        # what the filter reads, which `bodies` keeps up to date
+        self.arrays = bodies.table, bodies.radii, bodies.asleep, self.scene.walls
         # For each wall the ends of walls on its line: a disk that rests on the wall slides over
         # them, or off them.
         n, walls = self.scene.n, self.scene.walls
@@ -66,25 +68,11 @@ class ContactFinder:
         if self.scene.wrap is not None:
             yield from ((0.0, edge) for edge in self._edges(i))
         held = bodies.held[i]
-        yield from (
-            (0.0, Contact("end", i, c.j, side))
-            for c in held
-            if c.kind == "wall"
-            for side in (1, -1)
-        )
+        walls = [c.j for c in held if c.kind == "wall"]
+        yield from ((0.0, Contact("end", i, wall, side)) for wall in walls for side in (1, -1))
         if bodies.sliding[i]:
             yield from ((0.0, c._replace(kind="slip end")) for c in held)
-        count = soonest(
-            bodies.table,
-            bodies.radii,
-            bodies.asleep,
-            self.scene.walls,
-            i,
-            now,
-            left,
-            self.bounds,
-            self.codes,
-        )
+        count = soonest(*self.arrays, i, now, left, self.bounds, self.codes)
         for bound, code in zip(self.bounds[:count].tolist(), self.codes[:count].tolist()):
             contact = self.contact(i, code)
             if not held or not self._holds(contact):
@@ -205,10 +193,7 @@ class ContactFinder:
         return Touch(contact, contact.side * wall.ty, -contact.side * wall.tx)
 
     def touching(self, i: int, now: float) -> list[Contact]:
-        bodies = self.bodies
-        count = touching(
-            bodies.table, bodies.radii, bodies.asleep, self.scene.walls, i, now, self.codes
-        )
+        count = touching(*self.arrays, i, now, self.codes)
         return [self.contact(i, code) for code in self.codes[:count].tolist()]
 
     def alone(self, contact: Contact, now: float) -> bool:

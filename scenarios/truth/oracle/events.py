@@ -184,13 +184,10 @@ class Motion:
                 if (after := self.finder.time_to(contact, self.now, limit)) is None:
                     continue
                 place = k.sign(after - best[0][0]) if best else -1
-                best = (
-                    [(after, contact)]
-                    if place < 0
-                    else [*best, (after, contact)]
-                    if place == 0
-                    else best
-                )
+                if place < 0:
+                    best = [(after, contact)]
+                elif place == 0:
+                    best.append((after, contact))
         except Pressed:
             self.press(contact)
             return
@@ -252,14 +249,11 @@ class Motion:
         for i in sorted(members):
             if group := bodies.group[i]:
                 _, ax, ay = bodies.free[i]
-                walls = tuple(
-                    c
-                    for c in bodies.held[i]
-                    if c.kind == "wall" and k.sign(bodies.outward(c, ax, ay)) < 0
-                )
+                walls = [c for c in bodies.held[i] if c.kind == "wall"]
+                walls = [c for c in walls if k.sign(bodies.outward(c, ax, ay)) < 0]
                 spin = bodies.turn_at(i, self.now).spin
                 bodies.group[i] = frozenset()
-                bodies.hold(i, self.now, walls[:1], (*v[group][:2], spin), True)
+                bodies.hold(i, self.now, tuple(walls[:1]), (*v[group][:2], spin), True)
                 bodies.leaning[i] = {*walls}
         for contact in pairs.values():
             if contact.kind == "body":
@@ -315,12 +309,9 @@ class Motion:
                 end.few_bits = fault.few_bits
                 raise end from None
             return
-        if (
-            limit is None
-            and len(touches) > 1
-            and resting.gap_of(self.finder, touches, self.now) <= resting.NO_GAP
-        ):
-            limit = bodies.law.closed(touches, v, frozenset())
+        if limit is None and len(touches) > 1:
+            closes = resting.gap_of(self.finder, touches, self.now) <= resting.NO_GAP
+            limit = bodies.law.closed(touches, v, frozenset()) if closes else None
         if limit is None:
             return
         contacts = [contact for contact in contacts if contact in limit.still]
@@ -442,10 +433,8 @@ class Motion:
     def leave(self, contact: Contact) -> None:
         bodies, i, k = self.bodies, contact.i, self.k
         held = [c for c in bodies.held[i] if c.kind == "wall" and c.j == contact.j]
-        v, end = (
-            bodies.velocity_at(i, self.now),
-            self.scene.walls[contact.j, 1 if contact.side > 0 else 0],
-        )
+        v = bodies.velocity_at(i, self.now)
+        end = self.scene.walls[contact.j, 1 if contact.side > 0 else 0]
         following = resting.next_in_line(self.finder, held[0], contact.side)
         if bodies.group[i]:
             reason = f"disk {i} reaches the end of wall {contact.j} while it touches another"
@@ -454,18 +443,12 @@ class Motion:
             _, ax, ay = bodies.free[i]
             slow = v[0] * v[0] + v[1] * v[1] + bodies.radius[i] * bodies.outward(held[0], ax, ay)
             if k.sign(slow) <= 0 or len(bodies.held[i]) > 1:
-                raise MotionEnds(
-                    float(self.now),
-                    f"disk {i} slides off the end of wall {contact.j} so slowly that it turns about"
-                    " it",
-                    [i],
-                )
+                off = f"slides off the end of wall {contact.j}"
+                reason = f"disk {i} {off} so slowly that it turns about it"
+                raise MotionEnds(float(self.now), reason, [i])
             bodies.hold(i, self.now, (), v)
-            corner = next(
-                j
-                for j in range(self.scene.n, len(bodies.legs))
-                if (bodies.table[j, :2] == end).all()
-            )
+            ends = range(self.scene.n, len(bodies.legs))
+            corner = next(j for j in ends if (bodies.table[j, :2] == end).all())
             bodies.remember([self.finder.touch(Contact("body", i, corner), self.now)], set())
         else:
             bodies.hold(i, self.now, (following,), v, not bodies.sliding[i])
@@ -479,9 +462,8 @@ class Motion:
         self.bodies.across(contact, self.now)
         for other, gap in self.finder.near(i, self.now):
             if gap < 0:
-                reason = (
-                    f"disk {i} re-enters over the edge of the wrap onto {self.bodies.name(other)}"
-                )
+                onto = self.bodies.name(other)
+                reason = f"disk {i} re-enters over the edge of the wrap onto {onto}"
                 raise MotionEnds(float(self.now), reason, sorted(other.disks))
         self.follow_up({i})
 

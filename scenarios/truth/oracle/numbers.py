@@ -1,5 +1,5 @@
-"""Numbers with any number of digits behind one interface: mpfr of gmpy2, decimal of the standard
-library, and balls (intervals) of arb.
+"""Numbers with any number of digits behind one interface: mpfr of gmpy2, and balls (intervals) of
+arb.
 
 `Numbers` converts float64 exactly, takes square roots and determines signs. A number below `tie`
 counts as zero: no precision can distinguish an exact equality from a small difference, and two
@@ -9,16 +9,16 @@ lies inside one, its sign raises `Undecided`.
 
 from __future__ import annotations
 
-import decimal
 from collections.abc import Callable
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
-from importlib.util import find_spec
-from math import ceil, log10
 from typing import Any
 
+import flint
+import gmpy2
+
 Number = Any
-"""An mpfr, Decimal or arb. They share only the operators of arithmetic."""
+"""An mpfr or arb. They share only the operators of arithmetic."""
 
 
 class Undecided(ArithmeticError):
@@ -34,7 +34,6 @@ class Undecided(ArithmeticError):
 class Numbers:
     """One kind of numbers at one precision."""
 
-    name: str  # the library's type
     bits: int  # of each number
     exact: Callable[[float], Number]  # the same number, unrounded
     sqrt: Callable[[Number], Number]
@@ -47,52 +46,25 @@ class Numbers:
 
 
 def mpfr(bits: int) -> Numbers:
-    """MPFR's correctly rounded numbers. Raises ImportError where gmpy2 is missing."""
-    import gmpy2
+    """MPFR's correctly rounded numbers."""
 
-    def precise() -> AbstractContextManager[Any]:
-        context: AbstractContextManager[Any] = gmpy2.context(gmpy2.get_context(), precision=bits)
-        return context
+    def exact(x: float) -> Number:
+        return gmpy2.mpfr(x, 53)  # fewer bits than any precision used here: nothing is rounded
 
-    # A float64 has 53 bits, fewer than any precision used here: nothing is rounded.
-    return _rounded("mpfr", bits, lambda x: gmpy2.mpfr(x, 53), gmpy2.sqrt, precise)
-
-
-def decimals(bits: int) -> Numbers:
-    """The standard library's decimal numbers, of the same accuracy."""
-    context = decimal.Context(
-        prec=ceil(bits * log10(2)) + 1, Emin=decimal.MIN_EMIN, Emax=decimal.MAX_EMAX
-    )
-    return _rounded(
-        "decimal",
-        bits,
-        decimal.Decimal,
-        lambda x: x.sqrt(context),
-        lambda: decimal.localcontext(context),
-    )
-
-
-def _rounded(
-    name: str,
-    bits: int,
-    exact: Callable[[float], Number],
-    sqrt: Callable[[Number], Number],
-    precise: Callable[[], AbstractContextManager[Any]],
-) -> Numbers:
     tie = exact(2.0) ** -(bits // 2)
-
-    def sign(x: Number) -> int:
-        return 1 if x > tie else -1 if x < -tie else 0
-
-    def between(a: float, b: float) -> Number:
-        return exact((a + b) / 2)
-
-    return Numbers(name, bits, exact, sqrt, sign, precise, tie, between, lambda _x: 0.0)
+    return Numbers(
+        bits=bits,
+        exact=exact,
+        sqrt=gmpy2.sqrt,
+        sign=lambda x: 1 if x > tie else -1 if x < -tie else 0,
+        precise=lambda: gmpy2.context(gmpy2.get_context(), precision=bits),
+        tie=tie,
+        between=lambda a, b: exact((a + b) / 2),
+        spread=lambda _x: 0.0,
+    )
 
 
 def balls(bits: int) -> Numbers:
-    import flint
-
     nought = flint.arb(0)
 
     def sign(x: Number) -> int:
@@ -113,7 +85,6 @@ def balls(bits: int) -> Numbers:
             flint.ctx.prec = before
 
     return Numbers(
-        name="arb",
         bits=bits,
         exact=flint.arb,
         sqrt=lambda x: x.sqrt(),
@@ -124,13 +95,3 @@ def balls(bits: int) -> Numbers:
         spread=lambda x: float(x.rad()),
         proves=True,
     )
-
-
-def digits(bits: int) -> Numbers:
-    """mpfr where gmpy2 is installed, else decimal: the same answers, nearly as fast up to a few
-    hundred bits."""
-    return mpfr(bits) if find_spec("gmpy2") else decimals(bits)
-
-
-def has_balls() -> bool:
-    return find_spec("flint") is not None

@@ -252,11 +252,8 @@ def lasting(finder: ContactFinder, contact: Contact, now: Number) -> list[Group]
     would roll over another.
     """
     bodies, k, law = finder.bodies, finder.k, finder.bodies.law
-    touches = [
-        t
-        for t in finder.cluster([contact], now)
-        if key(t.contact) == key(contact) or closed(finder, t, now)
-    ]
+    touches = finder.cluster([contact], now)
+    touches = [t for t in touches if key(t.contact) == key(contact) or closed(finder, t, now)]
     disks = {i for touch in touches for i in touch.contact.disks}
     v = {i: bodies.velocity_at(i, now) for i in disks}
     free = {i: (*bodies.free[i][1:], bodies.nought) for i in disks}
@@ -278,9 +275,7 @@ def lasting(finder: ContactFinder, contact: Contact, now: Number) -> list[Group]
         ):
             raise MotionEnds(float(now), *upper_and_lower(finder, touch))
     contacts = [touch.contact for touch in pressed]
-    groups = [
-        move_as_one(finder, members, contacts, v) for members in joined(finder.scene, contacts)
-    ]
+    groups = [move_as_one(finder, disks, contacts, v) for disks in joined(finder.scene, contacts)]
     # `press` does a disk on one wall alone.
     return [g for g in groups if len(g.contacts) > 1 or g.contacts[0].kind == "body"]
 
@@ -314,12 +309,8 @@ def limit_of_series(
     fast = [abs(float(law.approach(t, v))) / length for t, length in zip(touches, lengths)]
     least = share * np.finfo(float).eps * scene.radius.min() / (rest + 1)
     # A disk may bounce to its rest on one wall between two bounces on another one.
-    slow = [speed for speed in fast if speed <= least]
-    if (
-        share == LEFT_OVER
-        and slow
-        and all(speed > APART * max(slow) for speed in fast if speed > least)
-    ):
+    slow, others = [u for u in fast if u <= least], [u for u in fast if u > least]
+    if share == LEFT_OVER and slow and all(speed > APART * max(slow) for speed in others):
         touches = [touch for touch, speed in zip(touches, fast) if speed <= least]
     matrix, speeds = delassus(law, touches), [law.approach(touch, v) for touch in touches]
     ends = any(t.contact.kind == "body" and t.contact.j >= scene.n for t in touches)
@@ -335,9 +326,8 @@ def limit_of_series(
         return None
     spare = SPARE_LIMIT * max(abs(float(impulse)) for impulse in impulses)
     forces = {a: impulse + k.between(-spare, spare) for a, impulse in enumerate(impulses)}
-    return TieOutcome(
-        apply(law, touches, forces, v), [], frozenset(touch.contact for touch in touches)
-    )
+    contacts = frozenset(touch.contact for touch in touches)
+    return TieOutcome(apply(law, touches, forces, v), [], contacts)
 
 
 def gap_of(finder: ContactFinder, touches: Sequence[Touch], now: Number) -> float:
@@ -387,13 +377,9 @@ def in_step_after(
     contacts of these."""
     k, velocities = finder.k, dict(outcome.velocities)
     walls = [c for c in outcome.still if c.kind == "wall" and c.i in velocities]
-    pairs = [
-        touch.contact
-        for touch in touches
-        if touch.contact.kind == "body"
-        and key(touch.contact) in {key(c) for c in outcome.still}
-        and not may_slide(k, touch, velocities)
-    ]
+    still = {key(c) for c in outcome.still}
+    closed = [t for t in touches if t.contact.kind == "body" and key(t.contact) in still]
+    pairs = [touch.contact for touch in closed if not may_slide(k, touch, velocities)]
     contacts = [*pairs, *walls]
     for members in joined(finder.scene, contacts):
         vx, vy = move_as_one(finder, members, contacts, velocities).velocity
@@ -465,14 +451,10 @@ def parallel(one: Array, other: Array) -> bool:
 
 def lie_down(finder: ContactFinder) -> list[Contact]:
     bodies, now = finder.bodies, finder.bodies.nought
-    lying = [
-        c
-        for c, approach in start(finder)
-        if c.kind == "wall"
-        and approach == 0
-        and bodies.k.sign(bodies.outward(c, *bodies.free[c.i][1:])) < 0  # pressed onto it
-    ]
-    return [c for c in lying if press(finder, c, now)]
+    walls = [c for c, approach in start(finder) if c.kind == "wall" and approach == 0]
+    free = {c: bodies.outward(c, *bodies.free[c.i][1:]) for c in walls}
+    pressed = [c for c in walls if bodies.k.sign(free[c]) < 0]
+    return [c for c in pressed if press(finder, c, now)]
 
 
 def next_in_line(finder: ContactFinder, contact: Contact, side: int) -> Contact | None:
@@ -591,11 +573,8 @@ def at_start(bodies: Bodies, contact: Contact) -> tuple[Fraction, Fraction, floa
     the speed, m/s, at which it opens, from these: a difference of two lengths in float64 would be 0
     for a small one."""
     rows, scene, i = bodies.table, bodies.scene, contact.i
-    (x, y), (u, v), r = (
-        rational(rows[i, :2]),
-        rational(rows[i, 2:4]),
-        Fraction(float(bodies.radii[i])),
-    )
+    (x, y), (u, v) = rational(rows[i, :2]), rational(rows[i, 2:4])
+    r = Fraction(float(bodies.radii[i]))
     if contact.kind == "body":
         (px, py), (pu, pv) = rational(rows[contact.j, :2]), rational(rows[contact.j, 2:4])
         r += Fraction(float(bodies.radii[contact.j]))
@@ -606,11 +585,8 @@ def at_start(bodies: Bodies, contact: Contact) -> tuple[Fraction, Fraction, floa
         return square - r * r, opens, overlap, float(opens) / distance
     (px, py), (qx, qy) = (rational(end) for end in scene.walls[contact.j])
     tx, ty = qx - px, qy - py
-    across, foot, square = (
-        tx * (y - py) - ty * (x - px),
-        tx * (x - px) + ty * (y - py),
-        tx * tx + ty * ty,
-    )
+    across, foot = tx * (y - py) - ty * (x - px), tx * (x - px) + ty * (y - py)
+    square = tx * tx + ty * ty
     if not 0 <= foot <= square:
         return Fraction(1), Fraction(0), -np.inf, 0.0
     gap, opens = across * across - r * r * square, contact.side * (tx * v - ty * u)

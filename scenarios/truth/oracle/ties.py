@@ -168,11 +168,9 @@ class CollisionLaw:
             after[contact.j] = (px + q * other * dx, py + q * other * dy, turn)
         speed2 = (px - ux) * (px - ux) + (py - uy) * (py - uy)
         collision = Collision(contact, q * root(square), -b / root(square * speed2))
-        return (
-            (after, collision)
-            if self.friction is None
-            else self.rubbed(touch, v, after, collision, self.friction)
-        )
+        if self.friction is None:
+            return after, collision
+        return self.rubbed(touch, v, after, collision, self.friction)
 
     def rubbed(
         self,
@@ -190,13 +188,11 @@ class CollisionLaw:
         slip = tx * (px - ux) + ty * (py - uy) - friction.radius[i] * spin
         inverse_effective_mass = self.inverse_mass[i] + friction.rim_inverse_mass(i)
         if body:
-            slip -= friction.radius[contact.j] * turn
-            inverse_effective_mass += self.inverse_mass[contact.j] + friction.rim_inverse_mass(
-                contact.j
-            )
-        kick, slip_ended = limited(
-            self.numbers, -slip / inverse_effective_mass, friction.coefficient * collision.impulse
-        )
+            j = contact.j
+            slip -= friction.radius[j] * turn
+            inverse_effective_mass += self.inverse_mass[j] + friction.rim_inverse_mass(j)
+        most = friction.coefficient * collision.impulse
+        kick, slip_ended = limited(self.numbers, -slip / inverse_effective_mass, most)
         after, sides = dict(after), [(i, -kick * tx, -kick * ty), (contact.j, kick * tx, kick * ty)]
         for k, jx, jy in sides[: len(contact.disks)]:
             w, turns = self.inverse_mass[k], friction.radius[k] * friction.inverse_inertia[k]
@@ -231,9 +227,7 @@ class CollisionLaw:
             now, collisions, still = waiting.pop()[:3]
             speeds = [(touch, self.approach(touch, now)) for touch in touches]
             closing = [
-                (touch, speed)
-                for touch, speed in speeds
-                if touch.contact not in still and sign(speed) < 0
+                (t, speed) for t, speed in speeds if t.contact not in still and sign(speed) < 0
             ]
             fastest = max((abs(float(speed)) for _, speed in closing), default=0.0)
             first = first or fastest
@@ -247,12 +241,9 @@ class CollisionLaw:
                 break
             for touch, _ in closing[-1:] if one_order else closing:
                 after, collision = self.collide(touch, now)
-                kept = {
-                    c
-                    for c in still
-                    if not c.disks & touch.contact.disks or stays_still(c, touch.contact)
-                }
-                kept |= {touch.contact} if self.sticks else set()
+                hit = touch.contact
+                kept = {c for c in still if not c.disks & hit.disks or stays_still(c, hit)}
+                kept |= {hit} if self.sticks else set()
                 state = TieOutcome(after, [*collisions, collision], frozenset(kept))
                 if one_order or tried < MERGE_FROM or not self._repeats(state, known):
                     waiting.append(state)

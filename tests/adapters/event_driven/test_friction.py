@@ -14,7 +14,8 @@ from crosscheck2d.adapters.play import play
 from crosscheck2d.adapters.run import Run
 from crosscheck2d.scenarios.families.placing import box, lay_out, scatter
 from crosscheck2d.scenarios.model import Array, Scenario, Scene, Thrust, Trajectory
-from crosscheck2d.scenarios.truth.exact import computed, digits
+from crosscheck2d.scenarios.truth.exact import computed
+from crosscheck2d.scenarios.truth.oracle.numbers import mpfr
 
 G = 10.0
 FLOOR = [[[-64.0, 0.0], [64.0, 0.0]]]
@@ -103,7 +104,7 @@ def test_engine_and_oracle_agree_on_a_box_of_frictional_disks(seed: int, restitu
     one = asked(scene, 2.0)
     motion, record = trajectory(one), computed(one)
     exact = record.sampled(scene, (), one.times)
-    practical = computed(one, digits).sampled(scene, (), one.times)
+    practical = computed(one, mpfr).sampled(scene, (), one.times)
 
     assert record.method == "certified"
     assert len(exact) == len(one.times)

@@ -12,7 +12,7 @@ from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.compare import laws, scales
 from crosscheck2d.reports.compare.comparison import Comparison
 from crosscheck2d.reports.compare.delays import jumps_of
-from crosscheck2d.reports.compare.fast_disks import passing
+from crosscheck2d.reports.compare.fast_disks import fast_note
 from crosscheck2d.reports.compare.metrics import METRICS
 from crosscheck2d.reports.compare.restitution import Restitutions
 from crosscheck2d.reports.compare.view import NOT_JUDGED, Value, View, beside
@@ -256,7 +256,7 @@ def test_a_floor_along_which_a_disk_rolls_is_no_wall_that_it_can_pass():
         fast = Scenario("fast", "?", "here", scene, 1.0, 0.1, (1, 2), without_truth="not needed")
         table = Comparison(fast, None, (), None)  # type: ignore[arg-type]
 
-        assert bool(passing(table)) is passes
+        assert bool(fast_note(table)) is passes
 
 
 def test_a_collision_found_forty_steps_late_is_counted_in_the_note():

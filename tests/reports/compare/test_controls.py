@@ -22,12 +22,8 @@ is to be caught."""
 MOVING = [name for name in SCENARIOS if name not in STILL]
 FEW = {"free_fall", "falling_box", "ship_thrust", "asteroids"}
 VELOCITIES = (
-    "velocity_max",
-    "velocity_rms",
-    "momentum_deviation",
-    "energy_error",
-    "energy_deviation",
-    "energy_loss_error",
+    *("velocity_max", "velocity_rms", "momentum_deviation"),
+    *("energy_error", "energy_deviation", "energy_loss_error"),
 )
 
 

@@ -21,17 +21,12 @@ from crosscheck2d.reports.page.scenes import scenes_of, values
 from crosscheck2d.reports.page.summary import summarize
 from crosscheck2d.reports.run.comparing import read_scene_table
 from crosscheck2d.scenarios.catalogue import scenario
-from crosscheck2d.scenarios.model import Scenario, Trajectory
+from crosscheck2d.scenarios.model import Collisions, Scenario, Trajectory
 from tests.reports.compare.answers import beside_truth, run_engine, truth_of
 
 CARRIED = (
-    "velocity_max",
-    "velocity_rms",
-    "angular_velocity_max",
-    "momentum_deviation",
-    "energy_deviation",
-    "energy_error",
-    "energy_loss_error",
+    *("velocity_max", "velocity_rms", "angular_velocity_max", "momentum_deviation"),
+    *("energy_deviation", "energy_error", "energy_loss_error"),
 )
 NAMES = ("reference:exercise", "pymunk:matched")
 
@@ -119,13 +114,7 @@ def test_two_engines_that_are_always_in_contact_are_not_judged_by_their_collisio
     one = scenario("slide_on_incline")
     found = run_engine(one, "reference:exercise").trajectory
     times = np.arange(0.0, one.duration, 2 * one.dt(1))
-    collisions = replace(
-        found.collisions,
-        t=times,
-        i=np.zeros(len(times), int),
-        j=np.full(len(times), -1),
-        impulse=np.ones(len(times)),
-    )
+    collisions = Collisions.of([(t, 0, -1, 1.0) for t in times])
     view = View(one, one.dt(1), replace(found, collisions=collisions), found)
     value = METRICS["velocity_max"].of(view)
 
@@ -212,9 +201,5 @@ def test_where_nobody_was_played_it_is_not_said_that_there_is_no_answer():
     comparisons = [compared(known_until("slow_collision", 50))]
     alone, without = nearest(summarize(comparisons, NAMES)), nearest(summarize([]))
 
-    assert (
-        alone
-        == "No engine is ranked: none keeps the laws and plays a scene with an exact answer to its"
-        " end."
-    )
+    assert alone.startswith("No engine is ranked: none keeps the laws and plays a scene")
     assert without.startswith("No scene here has an exact answer")

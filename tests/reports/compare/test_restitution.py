@@ -10,9 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from crosscheck2d.adapters.engine_row import FLOAT32, FLOAT64
-from crosscheck2d.reports.compare import restitution
 from crosscheck2d.reports.compare.metrics import METRICS
-from crosscheck2d.reports.compare.restitution import FLOOR, Restitutions, effective_restitution
+from crosscheck2d.reports.compare.restitution import (
+    FLOOR,
+    Reader,
+    Restitutions,
+    effective_restitution,
+)
 from crosscheck2d.reports.compare.view import SLOWEST, Value
 from crosscheck2d.scenarios.catalogue import scenario
 from crosscheck2d.scenarios.model import Array, Collisions, Scene, Trajectory
@@ -89,7 +93,7 @@ def test_a_contact_that_lasts_is_no_collision(name: str, substeps: int):
 def test_without_the_floor_it_would_be_read_as_minus_one(monkeypatch: pytest.MonkeyPatch):
     # The control: of most of the collisions that are read nothing is left of the velocity but its
     # sign.
-    monkeypatch.setattr(restitution, "FLOOR", 0.0)
+    monkeypatch.setattr("crosscheck2d.reports.compare.restitution.FLOOR", 0.0)
     assert read("gas_of_100", "box2d_v3:shipped", 1)[1].value > 1.99
 
 
@@ -165,7 +169,7 @@ def test_who_follows_a_ball_exactly_has_its_e(engine: str):
 
 def nothing_approaches(*given: Any) -> np.ndarray:
     """In place of `approach`: no pair is followed to a later sample."""
-    return np.zeros(len(given[3]), bool)
+    return np.zeros(len(given[2]), bool)
 
 
 def met(
@@ -204,7 +208,7 @@ def test_a_soft_contact_is_read_when_the_two_part(monkeypatch: pytest.MonkeyPatc
     assert found.values == pytest.approx([0.5])
     assert (found.below, found.unfinished) == (0, 0)
 
-    monkeypatch.setattr(restitution, "approach", nothing_approaches)
+    monkeypatch.setattr(Reader, "approach", nothing_approaches)
     assert met(-0.6, -0.1, 0.5, 0.8, 0.8).values == pytest.approx([-0.6])
 
 
@@ -249,7 +253,7 @@ def test_box2d_is_not_read_while_two_still_approach(substeps: int, monkeypatch: 
 
     assert error.value == pytest.approx(1.0, abs=1e-6)  # float32
     assert error.note.endswith(" not over")
-    monkeypatch.setattr(restitution, "approach", nothing_approaches)
+    monkeypatch.setattr(Reader, "approach", nothing_approaches)
     assert read("line_gas", "box2d_v3:shipped", substeps)[1].value > 1.1
 
 

@@ -24,9 +24,7 @@ from crosscheck2d.adapters.run import first_collisions
 from crosscheck2d.reports.game.divergence import (
     NEVER,
     WAIT,
-    Drift,
-    Edge,
-    FirstCollision,
+    Event,
     Touches,
     cause_of,
     differing_since,
@@ -293,8 +291,7 @@ def test_the_marker_names_the_first_collision():
     t, i, j = truth.collisions.t[0], truth.collisions.i[0], truth.collisions.j[0]
 
     assert ghost.divergence is not None
-    assert isinstance(ghost.divergence.at, FirstCollision)
-    assert ghost.divergence.at.pair == {i, j}
+    assert set(ghost.divergence.at.disks) == {i, j}
     assert ghost.divergence.at.frame == int(t / FRAME)
     assert 0 <= ghost.divergence.at.t - t <= flight.dt
     assert ghost.divergence.only == ""
@@ -464,8 +461,7 @@ def test_a_ship_that_leaves_in_one_engine_only_diverges_at_the_edge():
 
     assert soon is None
     assert slow.divergence is not None
-    assert isinstance(slow.divergence.at, Edge)
-    assert slow.divergence.at.frame == flight.left_at
+    assert (slow.divergence.at.disks, slow.divergence.at.frame) == ((), flight.left_at)
     assert slow.divergence.at.x == pytest.approx(-5.0, abs=0.01)
     assert slow.divergence.only == "reference:exercise"
 
@@ -489,7 +485,7 @@ def test_the_first_wrong_collision_is_named_though_the_pair_goes_on_colliding():
     assert found[: WAIT - 1] == [None] * (WAIT - 1)
     at, in_solid, in_ghost = found[WAIT - 1]  # type: ignore[misc]
 
-    assert (at.frame, at.i, at.j) == (10, 3, 4)
+    assert (at.frame, at.disks) == (10, (3, 4))
     three, four = (before.position + before.velocity / 1024)[3:5]
     share = scene.radius[3] / scene.radius[3:5].sum()
     assert (at.x, at.y) == pytest.approx(tuple(three + share * (four - three)))
@@ -504,7 +500,7 @@ def test_a_velocity_that_differs_without_a_collision_is_said_to():
     flight.advance(WAIT)
 
     assert slow.divergence is not None
-    assert slow.divergence.at == Drift(40, SHIP, *slow.state.position[SHIP])
+    assert slow.divergence.at == Event(40, *slow.state.position[SHIP], (SHIP,))
 
 
 @pytest.mark.parametrize("name", ["reference:exercise", "event_driven:float64", "pymunk:matched"])

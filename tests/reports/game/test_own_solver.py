@@ -28,7 +28,7 @@ from crosscheck2d.reports.game.command import PATIENCE, game_of, own_rows
 from crosscheck2d.reports.game.flight import FRAME, Flight, field_scenario
 from crosscheck2d.reports.game.server import Game, labels
 from crosscheck2d.reports.game.session import Session
-from crosscheck2d.reports.page.own_solvers import with_lines
+from crosscheck2d.reports.page.kit import with_lines
 from tests.bench.game import measure
 from tests.reports.game.test_page import fly, paused
 from tests.reports.page.browsing import opened, served

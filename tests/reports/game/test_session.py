@@ -68,7 +68,7 @@ def test_another_scene_with_a_wrap_is_played_as_the_harness_plays_it():
 
 
 def test_the_flame_is_against_a_thrust_that_turns_with_the_ship():
-    whole = SCENARIOS["body_frame_thrust"]()
+    whole = SCENARIOS["body_frame_thrust"]
     session = Session(["reference:exercise"], whole)
     [thrust] = whole.thrusts
     x, y = thrust.force

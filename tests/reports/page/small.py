@@ -42,38 +42,17 @@ def played(name: str, **changes: Any) -> Comparison:
 
 
 def write_small(path: Path, comparisons: list[Comparison], **more: Any) -> None:
-    probe = {
-        "engine": "pymunk",
-        "profile": "matched",
-        "probe": HOSTILE,
-        "asked": HOSTILE,
-        "got": 0.81,
-        "expected": 0.9,
-    }
-    conformance = pd.DataFrame([probe | {"bound": 1e-6, "verdict": "departs", "note": HOSTILE}])
-    known = {
-        "column": "ODE",
-        "dt_s": 1e-3,
-        "published_J2": 185.027,
-        "ours_J2": 185.027,
-        "made_by": "reference:exercise",
-        "source": HOSTILE,
-    }
-    about = {
-        "command": f"crosscheck --out '{HOSTILE}'",
-        "seed": 0,
-        "machine": {"system": HOSTILE},
-        "seconds": 1.0,
-        "unfinished": "",
-    }
-    about |= {
-        "versions": {"pymunk": "7.3.1"},
-        "started": "2026-01-01T00:00:00+00:00",
-    }
+    probe = {"engine": "pymunk", "profile": "matched", "probe": HOSTILE, "asked": HOSTILE}
+    probe |= {"got": 0.81, "expected": 0.9, "bound": 1e-6, "verdict": "departs", "note": HOSTILE}
+    known = {"column": "ODE", "dt_s": 1e-3, "published_J2": 185.027, "ours_J2": 185.027}
+    known |= {"made_by": "reference:exercise", "source": HOSTILE}
+    about = {"command": f"crosscheck --out '{HOSTILE}'", "seed": 0, "machine": {"system": HOSTILE}}
+    about |= {"seconds": 1.0, "unfinished": "", "versions": {"pymunk": "7.3.1"}}
+    about["started"] = "2026-01-01T00:00:00+00:00"
     page = report_page(
         path,
         summarize(comparisons),
-        conformance=conformance,
+        conformance=pd.DataFrame([probe]),
         known_answers=[known],
         about=about,
         **{"first": ["One.", HOSTILE, "Three."], **more},

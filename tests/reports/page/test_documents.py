@@ -15,14 +15,8 @@ from crosscheck2d.reports.page.style import look
 TEMPLATES = sorted(REPORTS.glob("*/*.j2"))
 BASE = "page/base.html.j2"
 # no pages: they stand inside of one
-PARTS = {
-    BASE,
-    "lessons/conventions.html.j2",
-    "game/own_solvers.html.j2",
-    "page/kit_parts.html.j2",
-}
-
-LINKS = {"game": "", "lesson": ""}
+INSIDE = ("lessons/conventions", "game/own_solvers", "page/kit_parts")
+PARTS = {BASE, *(f"{name}.html.j2" for name in INSIDE)}
 
 
 def short(path: Path) -> str:
@@ -48,28 +42,19 @@ def test_no_macro_is_defined_twice():
 
 
 def test_templates_are_read_in_one_place():
-    users = []
-    for path in REPORTS.rglob("*.py"):
-        imports = [
-            node
-            for node in ast.walk(ast.parse(path.read_text()))
-            if isinstance(node, ast.ImportFrom)
-        ]
-        users += [short(path)] * any(node.module == "jinja2" for node in imports)
+    users = [
+        short(path)
+        for path in REPORTS.rglob("*.py")
+        if any(getattr(n, "module", "") == "jinja2" for n in ast.walk(ast.parse(path.read_text())))
+    ]
 
     assert users == ["page/documents.py"]
 
 
 def test_text_is_escaped_and_a_name_that_nobody_gave_is_an_error():
     name = "<b>engine</b>:shipped"
-    page = render(
-        "lessons/index.html.j2",
-        generator="<i>",
-        looks={name: look(name)},
-        links=LINKS,
-        groups={},
-        table="<u>",
-    )
+    fields = {"links": {"game": "", "lesson": ""}, "groups": {}, "table": "<u>"}
+    page = render("lessons/index.html.j2", generator="<i>", looks={name: look(name)}, **fields)
 
     assert "<u>" not in page
     assert "<i>" not in page

@@ -11,9 +11,8 @@ from hypothesis import strategies as st
 from crosscheck2d.adapters.engines import row_of
 from crosscheck2d.adapters.play import play
 from crosscheck2d.reports.commands.run import medians
+from crosscheck2d.reports.compare.accuracy import cost_to_reach, middle_half
 from crosscheck2d.reports.compare.comparison import Comparison, compare
-from crosscheck2d.reports.compare.pareto import cost_to_reach
-from crosscheck2d.reports.compare.pooling import middle_half
 from crosscheck2d.reports.page.findings import findings, nearest
 from crosscheck2d.reports.page.scenes import scenes_of
 from crosscheck2d.reports.page.summary import summarize

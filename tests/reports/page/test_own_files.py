@@ -12,19 +12,14 @@ from playwright.sync_api import Browser
 from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.compare.comparison import compare
 from crosscheck2d.reports.page.findings import early_ends, not_counted, refusals
-from crosscheck2d.reports.page.own_solvers import with_lines
+from crosscheck2d.reports.page.kit import with_lines
 from crosscheck2d.scenarios.catalogue import scenario
 from tests.reports.page.browsing import overhang
 
 
 def test_who_is_not_counted_is_named_with_the_probe_that_it_missed():
-    row = {
-        "asked": "Where does a used engine differ from a fresh one after load?",
-        "got": "position after 10 steps",
-        "expected": "nowhere",
-        "note": "",
-    }
-
+    asked = "Where does a used engine differ from a fresh one after load?"
+    row = {"asked": asked, "got": "position after 10 steps", "expected": "nowhere", "note": ""}
     raised = row | {"got": "raised", "note": "NameError: no q"}
 
     assert not_counted({"b.js:own": raised, "a.js:own": row}) == [

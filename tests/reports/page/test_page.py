@@ -51,16 +51,11 @@ def open_scene(page: Page, name: str) -> None:
     page.locator(f"#{name} + tr.opened canvas").first.wait_for()
 
 
-def test_a_scene_opens_below_its_row_at_the_first_visible_difference(page: Page):
-    page.get_by_role("button", name=HEAD_ON.replace("_", " ")).click()
+def test_at_most_three_engines_are_ticked(page: Page):
+    open_scene(page, HEAD_ON)
     row = page.locator(f"#{HEAD_ON} + tr.opened")
-    row.locator("canvas").first.wait_for()
-    ticked = row.locator(".chips input:checked").count()
 
-    assert ticked == row.locator("canvas").count() <= 3
-    assert "visible difference" in row.locator(".says").inner_text()
-    row.locator(".chips input").first.uncheck()
-    assert row.locator("canvas").count() == ticked - 1
+    assert row.locator(".chips input:checked").count() == row.locator("canvas").count() <= 3
 
 
 @pytest.mark.parametrize("name", [HEAD_ON, pytest.param(ASTEROIDS, marks=pytest.mark.slow)])

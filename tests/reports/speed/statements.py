@@ -12,8 +12,7 @@ from math import inf
 import pandas as pd
 
 from crosscheck2d.adapters.engines import ENGINES
-from crosscheck2d.reports.compare.order import FINEST, NEARER
-from crosscheck2d.reports.compare.pareto import YARDSTICK
+from crosscheck2d.reports.compare.accuracy import FINEST, NEARER, YARDSTICK
 from crosscheck2d.reports.run.scenes import open_scene
 from crosscheck2d.reports.speed import figures
 from crosscheck2d.reports.speed.budget import explained_share

@@ -11,12 +11,12 @@ import pandas as pd
 import pytest
 
 from crosscheck2d.adapters.engines import read_row
-from crosscheck2d.reports.compare.pooling import POOLED
+from crosscheck2d.reports.compare.accuracy import POOLED
 from crosscheck2d.reports.run.cells import about
 from crosscheck2d.reports.run.store import writing
 from crosscheck2d.reports.speed import ladder, measure
 from crosscheck2d.reports.speed.command import SPEED, kept_of
-from crosscheck2d.reports.speed.measure import Kept, done
+from crosscheck2d.reports.speed.measure import Kept, do_all
 from crosscheck2d.reports.speed.plan import QUICK, SpeedPlan
 from crosscheck2d.reports.terminal import progress as terminal
 from crosscheck2d.reports.terminal.progress import Progress
@@ -33,7 +33,7 @@ def test_what_has_ended_is_not_measured_again(tmp_path: Path):
     with writing(tmp_path / "out", SPEED) as store, Progress() as progress:
         Kept(store, HEADER).add(TASK, [FAILED])
         again = Kept(store, HEADER)
-        ((_, (row,)),) = done({TASK: fails}, 1, progress, "error", kept=again)
+        (row,) = do_all({TASK: fails}, 1, progress, "error", kept=again)[TASK]
         changed = Kept(store, HEADER | {"seed": 1})
 
         assert row["error_radii"] == np.inf
@@ -56,7 +56,7 @@ def test_a_new_measurement_is_not_older_than_its_command(tmp_path: Path):
 def test_what_was_measured_of_a_solver_that_was_saved_since_is_measured_again(tmp_path: Path):
     solver = tmp_path / "solver.js"
     solver.write_text("function integrate(sphere, dt) {}")
-    plan = SpeedPlan(("slow_collision",), [f"{solver}:own"], QUICK, 0, 1, whole=False)
+    plan = SpeedPlan(QUICK.of_scenes(["slow_collision"]), [f"{solver}:own"], 0, 1)
     header: dict[str, Any] = {key: HEADER[key] for key in ("seed", "versions", "machine")}
     read_row(f"{solver}:own")
     with writing(tmp_path / "out", SPEED) as store:
@@ -134,7 +134,7 @@ def test_bad_input_is_one_clear_sentence(words: str, says: str):
 def test_a_scene_without_an_exact_answer_is_refused_by_name(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    monkeypatch.setattr("crosscheck2d.reports.speed.ladder.reach_of", no_reach)
+    monkeypatch.setattr("crosscheck2d.reports.speed.ladder.reason_of", lambda *_: "two outcomes")
     done = crosscheck("speed", "cradle_touching", "--out", "out", cwd=tmp_path)
 
     assert done.returncode == 1
@@ -142,10 +142,6 @@ def test_a_scene_without_an_exact_answer_is_refused_by_name(
     assert "no exact answer: two outcomes" in done.stderr
     files = {path.name for path in (tmp_path / "out").iterdir()}
     assert files == {".crosscheck.lock", "results.sqlite"}
-
-
-def no_reach(*_: object) -> tuple[int, str]:
-    return 0, "two outcomes"
 
 
 @pytest.mark.slow

@@ -7,8 +7,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from crosscheck2d.reports.compare.order import ORDER
-from crosscheck2d.reports.compare.pareto import FAILED, NOT_TIMED, UNREACHABLE, cost_to_reach
+from crosscheck2d.reports.compare.accuracy import (
+    FAILED,
+    NOT_TIMED,
+    ORDER,
+    UNREACHABLE,
+    cost_to_reach,
+)
 from crosscheck2d.reports.page.kit import Table
 from crosscheck2d.reports.speed import page, tables
 from crosscheck2d.reports.speed.measure import SIZE, Measured
@@ -79,7 +84,7 @@ def test_a_sweep_that_fails_most_scenes_stays_in_the_pool_and_in_the_table():
     failed = sweep("9", 1, cost=np.nan, error=np.inf, failed=1, status="error", reason="no")
     rows = (point(step_size=2), sweep("1", 0), failed)
     table = pd.DataFrame([row | {"scenario": name} for name in ("one", "two") for row in rows])
-    pool = tables.pooled_sweeps(table)
+    pool, _ = tables.pooled_sweeps(table)
     lost = [row for row in rows_of(page.sweeps_table(table)) if row["failed"]]
 
     assert pool.set_index("change").failed.to_dict() == {"": 0, "1": 0, "9": 2}
@@ -95,8 +100,9 @@ def test_a_scene_without_a_ratio_is_named():
     rows += [sweep("1", 0, scenario=name) for name in ("one", "exact", "gone")]
     table = pd.DataFrame(rows)
 
-    assert tables.without_ratio(table) == [("pymunk", "exact"), ("pymunk", "gone")]
-    assert set(tables.pooled_sweeps(table)["of"]) == {1}
+    pool, without_ratio = tables.pooled_sweeps(table)
+    assert without_ratio == [("pymunk", "exact"), ("pymunk", "gone")]
+    assert set(pool["of"]) == {1}
 
 
 def test_a_change_that_fails_has_its_row_with_how_it_failed():

@@ -17,9 +17,8 @@ from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.adapters.mechanisms.options import OPTIONS
 from crosscheck2d.adapters.mechanisms.table import MECHANISMS
 from crosscheck2d.adapters.play import play
+from crosscheck2d.reports.compare.accuracy import ACCURACIES, FAILED, UNREACHABLE, said_of_pool
 from crosscheck2d.reports.compare.comparison import compare
-from crosscheck2d.reports.compare.pareto import ACCURACIES, FAILED, UNREACHABLE
-from crosscheck2d.reports.compare.pooling import said_of_pool
 from crosscheck2d.reports.run.arguments import opening
 from crosscheck2d.reports.run.cells import about
 from crosscheck2d.reports.speed import figures
@@ -28,7 +27,7 @@ from crosscheck2d.reports.speed.command import SPEED, write_all
 from crosscheck2d.reports.speed.measure import Measured, Measuring
 from crosscheck2d.reports.speed.page import LOWEST, NEVER, drawn_lines, reached_table, write_page
 from crosscheck2d.reports.speed.plan import QUICK, SpeedPlan
-from crosscheck2d.reports.speed.results import Results
+from crosscheck2d.reports.speed.tables import Results, pooled_sweeps
 from crosscheck2d.reports.terminal.progress import Progress
 from crosscheck2d.scenarios.catalogue import scenario
 from crosscheck2d.scenarios.truth.exact import CLOSED_FORM, EVENT_DRIVEN
@@ -41,6 +40,7 @@ SCENES = ("head_on_equal_e09", "asteroids")
 PLAYED = ("reference:exercise", "pymunk:shipped", "pymunk:matched", "event_driven:float64")
 LITTLE = replace(
     QUICK,
+    scenes=SCENES,
     seeds=3,
     most_steps=1000,
     rounds=2,
@@ -53,7 +53,7 @@ LITTLE = replace(
 )
 CUTS = "Scenes that are not evaluated up to the end of their exact answer"
 HEADER = about("crosscheck speed", 0) | {"load": 0.0, "seconds": 1.0}
-PLAN = SpeedPlan(SCENES, PLAYED, LITTLE, 0, 2)
+PLAN = SpeedPlan(LITTLE, PLAYED, 0, 2)
 
 
 @pytest.fixture(scope="module")
@@ -213,7 +213,7 @@ def test_a_sweep_meets_its_engine_where_it_is_matched(results: Results):
     here = rows_of(table, engine="pymunk", scenario="slide_on_incline")
     turned = here[here.change == "10"].iloc[0]
     same = here[(here.change == "") & (here.dt_s == turned.dt_s)].iloc[0]
-    pooled = results.pooled_sweeps
+    pooled, _ = pooled_sweeps(table)
 
     assert turned.error == same.error
     assert pooled[pooled.change == "10"].error.iloc[0] == 1.0
@@ -238,6 +238,7 @@ def test_figures_come_back_as_they_were_kept(results: Results, tmp_path: Path):
     assert "# processor: " in path.read_text()
     assert "# pymunk: 7" in path.read_text()
     assert ("pymunk:matched", 100) in kept
+    assert results.sizes.worst.notna().all()
     assert figures.drifted(kept, kept) == []
 
 
@@ -300,9 +301,3 @@ def test_the_page_opens_every_scene_and_asks_nothing_of_anywhere(
     assert tab.get_by_text("no <b>such</b> thing").count() > 0
     assert tab.locator("b:text('such')").count() == 0
     assert heard == []
-
-
-def test_a_settled_pile_is_a_row_with_sleeping_and_without(results: Results):
-    assert [*results.pile.name] == ["pymunk:matched"]
-    assert (results.pile[["", "sleeping"]] > 0).all(axis=None)
-    assert results.sizes.worst.notna().all()

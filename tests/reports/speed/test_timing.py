@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from contextlib import closing
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from time import sleep
@@ -19,7 +18,6 @@ from crosscheck2d.reports.run.timing import FEWEST_ROUNDS, WARM_UP, Sample, Time
 from crosscheck2d.reports.speed import ladder, sizes
 from crosscheck2d.reports.speed.ladder import scored
 from crosscheck2d.reports.speed.measure import IN_PILE, Measured, samples_table
-from crosscheck2d.reports.speed.plan import QUICK, READY, all_rounds
 from crosscheck2d.reports.speed.tables import end_of_all_pairs, pile, summed_up
 from crosscheck2d.scenarios.catalogue import scenario
 from crosscheck2d.scenarios.model import Scene
@@ -88,14 +86,6 @@ def test_what_is_slow_sits_out_the_rounds_left_but_not_the_first():
 
     assert rounds["9.0"] == list(range(WARM_UP, FEWEST_ROUNDS))
     assert rounds["0.1"] == list(range(WARM_UP, 8))
-
-
-@pytest.mark.parametrize("run", [0.0019, 0.0099, 0.03, 9.0])
-def test_the_estimate_counts_the_rounds_that_are_taken(run: float):
-    effort = replace(QUICK, rounds=8, budget=0.05)
-    samples = interleaved([fixed(run)], effort.rounds, effort.budget, seed=0)
-
-    assert all_rounds(run, effort) == pytest.approx(len(samples) * (run + READY))
 
 
 def test_a_sample_is_filled_with_runs_and_reported_per_unit():

@@ -16,7 +16,7 @@ from playwright.sync_api import Browser, Page
 from crosscheck2d.adapters.engines import ENGINES, read_row
 from crosscheck2d.adapters.host.engine import TEMPLATES
 from crosscheck2d.reports import cli
-from crosscheck2d.reports.page.links import PAGES
+from crosscheck2d.reports.page.kit import PAGES
 from crosscheck2d.reports.run.store import reading, writing
 from crosscheck2d.reports.stability.cases import CASES
 from crosscheck2d.reports.stability.command import COLUMNS, STABILITY, write_files

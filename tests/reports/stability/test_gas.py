@@ -209,7 +209,7 @@ def test_what_pymunk_tells_of_its_collisions_is_what_it_gives_only_if_it_forgets
 ):
     # A heavy disk drives a light one against a wall: in all, impulses of twice the heavy one's
     # momentum, once each.
-    scenario = SCENARIOS["galperin_314"]()
+    scenario = SCENARIOS["galperin_314"]
     dt = scenario.dt(4)
     reported = {}
     for steps in (3, 1):

@@ -9,9 +9,9 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from crosscheck2d.adapters.engines import ENGINES, FETCHED
+from crosscheck2d.adapters.engines import ENGINES, FETCHED, NAMED
+from crosscheck2d.reports.compare.comparison import COLUMNS
 from crosscheck2d.reports.compare.metrics import METRICS
-from crosscheck2d.reports.compare.table import COLUMNS
 from crosscheck2d.reports.compare.verdicts import VERDICTS
 from crosscheck2d.reports.lessons.catalogue import LESSONS
 from crosscheck2d.reports.run import arguments
@@ -62,7 +62,7 @@ def test_what_reads_only_the_beginning_of_a_list_ends_it_silently(tmp_path: Path
     done = subprocess.run(["bash", "-c", words], cwd=tmp_path, capture_output=True, text=True)
 
     assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout == f"{len(ENGINES | FETCHED)} engines\n"
+    assert done.stdout == f"{len(ENGINES | FETCHED | NAMED)} engines\n"
 
 
 def test_a_run_that_names_its_engines_fetches_no_others(
