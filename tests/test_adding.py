@@ -334,7 +334,6 @@ def test_an_engine_is_named_in_its_files_and_its_row_and_else_only_in_texts_abou
     about_it |= {f"reports/lessons/friction/{name}.py" for name in ("bounce", "cone", "rolling")}
     about_it |= {
         "adapters/mechanisms/settings.py",
-        "reports/stability/reasons.py",
         "reports/stability/explain.py",
         "reports/compare/causes.py",
     }  # why an engine fails, and which setting removes it, with the source

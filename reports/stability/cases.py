@@ -4,11 +4,12 @@ file that is varied."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import tomllib
+from collections.abc import Callable, Iterator
 from dataclasses import replace
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -17,16 +18,25 @@ from crosscheck2d.reports.compare.collisions import match, on_faces, pair_keys, 
 from crosscheck2d.reports.compare.verdicts import MOST_LOST, MOST_OVERLAP, Verdict, verdicts
 from crosscheck2d.reports.compare.view import cut
 from crosscheck2d.reports.page.style import number
-from crosscheck2d.reports.stability.cases_few import ALONE, COLLISIONS
-from crosscheck2d.reports.stability.cases_friction import FRICTION
-from crosscheck2d.reports.stability.cases_many import GAS, STACKS
-from crosscheck2d.reports.stability.limits import WITH_FRICTION_ONLY, Case
-from crosscheck2d.reports.stability.predicates import Predicate, largest, read, worst_of
+from crosscheck2d.reports.stability import (
+    cases_few,
+    cases_many,
+    predicates,
+    predicates_gas,
+)
+from crosscheck2d.reports.stability.cases_many import restarted, reversed_order
+from crosscheck2d.reports.stability.limits import (
+    WITH_FRICTION_ONLY,
+    Case,
+    once,
+    step_size,
+    with_variant,
+)
+from crosscheck2d.reports.stability.predicates import Predicate, largest, predicate, read, worst_of
 from crosscheck2d.scenarios.catalogue import RANDOM, SCENARIOS, scenario
 from crosscheck2d.scenarios.files.scene_file import read_scene_file
 from crosscheck2d.scenarios.model import (
     Array,
-    Collisions,
     Scenario,
     Scene,
     Thrust,
@@ -44,77 +54,66 @@ LONG = 2e4  # steps of a disk
 SEEDS = 4  # runs at a value of a random scene
 
 
-def usable(scenario: Scenario, played: Trajectory) -> Verdict:
-    parts = [
-        overlaps(scenario, played),
-        slowed(scenario, played),
-        wrong_collisions(scenario, played),
-        thrown(scenario, played),
-    ]
-    for verdict in verdicts(scenario, played, scenario.dt(scenario.substeps[0])):
+@predicate(
+    "a number is not finite, a disk goes through a wall or a disk, energy grows by 5 %, disks"
+    " overlap by a tenth of a radius, a disk in free flight moves by half its distance only (its"
+    " speed is capped, or its position has too few digits), or a collision is wrong",
+    "of the bound",
+    1.0,
+)
+def unusable(scenario: Scenario, played: Trajectory) -> Verdict:
+    scene, dt = scenario.scene, step_size(scenario)
+    _, true = answered(scenario)
+    # for a single free disk nothing is checked
+    parts = [read(0.0, np.nan, "")]
+    if scene.n + len(scene.walls) > 1:
+        # in any sample: a verdict allows for the approach in a step, but here that is too large
+        overlap = laws.penetration(played, scene)
+        event = f"an overlap of {overlap.max():.3g} radii"
+        parts.append(largest(played.t, overlap, MOST_OVERLAP, event, None, "penetration"))
+    if len(played) > 1 and scene.wrap is None:
+        parts.append(slowed(scenario, played, true))
+    if true is not None:
+        k = min(len(played), len(true))
+        parts += wrong_collisions(scene, cut(played, k), cut(true, k), dt)
+        value, at, disk, wall = thrown_off(played, true, scene)
+        event = f"disk {disk} is thrown off the surface of wall {wall}, where two of its walls meet"
+        parts.append(read(value, at, event, disk, GHOST))
+    for verdict in verdicts(scenario, played, dt):
         if verdict.id in ("tunnelled", "energy_gained"):
             value = verdict.value / verdict.bound if verdict.bound else 2 * verdict.value
-            disk = verdict.disks[0] if verdict.disks else None
-            parts.append(read(value, verdict.at, verdict.text, disk, verdict.id))
-    # for a single free disk nothing is checked
-    return worst_of([part for part in parts if part] or [read(0.0, np.nan, "")])
+            first = verdict.disks[0] if verdict.disks else None
+            parts.append(read(value, verdict.at, verdict.text, first, verdict.id))
+    return worst_of(parts[1:] or parts)
 
 
-def overlaps(scenario: Scenario, played: Trajectory) -> Verdict | None:
-    """Any overlap in any sample: a verdict allows for the approach in a step, but here the step is
-    what is too large."""
-    if scenario.scene.n + len(scenario.scene.walls) < 2:
-        return None
-    overlap = laws.penetration(played, scenario.scene)
-    event = f"an overlap of {overlap.max():.3g} radii"
-    return largest(played.t, overlap, MOST_OVERLAP, event, None, "penetration")
-
-
-def slowed(scenario: Scenario, played: Trajectory) -> Verdict | None:
+def slowed(scenario: Scenario, played: Trajectory, true: Trajectory | None) -> Verdict:
     """The largest part of its distance that a disk loses in a sample interval of free flight: its
     position has too few digits, or the engine caps its speed.
 
-    The distance is that of the exact answer, as long as the disk has met nothing but walls, as
-    often as there: its speed must be the same. It is also that of the engine's own velocity, before
-    the first collision of a disk: two collisions between two samples may restore its velocity.
+    The distance is that of the engine's own velocity, before the first collision of a disk: two
+    collisions between two samples may restore its velocity. It is also that of the exact answer, as
+    long as the disk has met nothing but walls, as often as there: its speed must be the same.
     """
-    scene = scenario.scene
-    if len(played) < 2 or scene.wrap is not None:
-        return None
-    expected = np.maximum(own_distance(scenario, played), exact_distance(scenario, played))
+    scene, v = scenario.scene, played.velocity
+    met = collided(played, scene, played.t)
+    steady = (v[1:] == v[:-1]).all(axis=2) & ~met[1:].any(axis=2) & ~scene.static
+    expected = np.where(steady, laws.lengths(v[1:]) * scenario.sample_interval, 0.0)
+    if true is not None and len(true) > 1:
+        met, exact = (collided(run, scene, true.t) for run in (played, true))
+        alike = (met == exact).all(axis=2) & (exact[:, :, 0] == 0)
+        free = (np.diff(exact, axis=0) == 0).all(axis=2)
+        v = true.velocity
+        steady = laws.lengths(np.diff(v, axis=0)) <= STEADY * laws.lengths(v[1:])
+        where = alike[1:] & alike[:-1] & free & steady
+        distance = np.where(where, laws.lengths(np.diff(true.position, axis=0)), 0.0)
+        expected[: len(distance)] = np.maximum(expected[: len(distance)], distance)
     expected /= scene.radius
     moved = laws.lengths(np.diff(played.position, axis=0)) / scene.radius
     lost = np.where(expected > LEAST_WAY, 1 - moved / np.where(expected > 0, expected, 1.0), 0.0)
     k, disk = np.unravel_index(int(lost.argmax()), lost.shape)
     event = f"disk {disk} moves by {max(1 - float(lost[k, disk]), 0.0):.3g} of its distance"
     return read(lost.max() / MOST_LOST, played.t[k + 1], event, int(disk), "wrong distance")
-
-
-def own_distance(scenario: Scenario, played: Trajectory) -> Array:
-    """(samples - 1, n) m, how far each disk moves between two samples by its own velocity, where
-    that stays the same and the disk has not yet collided; else 0."""
-    scene, v = scenario.scene, played.velocity
-    steady = (v[1:] == v[:-1]).all(axis=2) & ~collided(played, scene, played.t[1:]).any(axis=2)
-    distance = laws.lengths(v[1:]) * scenario.sample_interval
-    return np.where(steady & ~scene.static, distance, 0.0)
-
-
-def exact_distance(scenario: Scenario, played: Trajectory) -> Array:
-    """(samples - 1, n) m, how far each disk moves between two samples of the exact answer, where it
-    flies freely there and in the run, and has met the same walls as often, and no disk; else 0."""
-    distance = np.zeros((len(played) - 1, scenario.scene.n))
-    _, true = answered(scenario)
-    if true is None or len(true) < 2:
-        return distance
-    t, v = true.t, true.velocity
-    met, expected = (collided(run, scenario.scene, t) for run in (played, true))
-    alike = (met == expected).all(axis=2) & (expected[:, :, 0] == 0)
-    free = (np.diff(expected, axis=0) == 0).all(axis=2)
-    change = laws.lengths(np.diff(v, axis=0))
-    steady = change <= STEADY * laws.lengths(v[1:])
-    where = alike[1:] & alike[:-1] & free & steady
-    distance[: len(t) - 1] = np.where(where, laws.lengths(np.diff(true.position, axis=0)), 0.0)
-    return distance
 
 
 def collided(played: Trajectory, scene: Scene, t: Array) -> Array:
@@ -129,55 +128,26 @@ def collided(played: Trajectory, scene: Scene, t: Array) -> Array:
     return counts.cumsum(axis=0)[:-1]
 
 
-def wrong_collisions(scenario: Scenario, played: Trajectory) -> Verdict | None:
-    scenario, true = answered(scenario)
-    if true is None:
-        return None
-    k = min(len(played), len(true))
-    played, true = cut(played, k), cut(true, k)
-    actual, exact = (on_faces(run, scenario.scene) for run in (played, true))
-    end, dt = float(true.t[-1]), scenario.dt(scenario.substeps[0])
+def wrong_collisions(
+    scene: Scene, played: Trajectory, true: Trajectory, dt: float
+) -> Iterator[Verdict]:
+    actual, exact = (on_faces(run, scene) for run in (played, true))
+    end = float(true.t[-1])
     matched = match(actual, exact, end, dt)
-    wrong = matched.first_wrong or never_collision(actual, exact, end - 3 * dt)
+    wrong = matched.first_wrong
     if wrong is None:
-        return None
+        # `match` leaves out a collision near the start: it is missed if its pair never collides
+        hard = (exact.impulse > 0) & (exact.t < end - 3 * dt)
+        missed = np.flatnonzero(hard & ~np.isin(pair_keys(exact), pair_keys(actual)))
+        if not len(missed):
+            return
+        first = missed[0]
+        wrong = float(exact.t[first]), f"missed {who(exact.i[first], exact.j[first])}"
     at, what = wrong
     kind, pair = what.split(maxsplit=1)
     count = len(matched.missed) + len(matched.spurious)
     disk = int(pair.split("-")[0])
-    return read(2.0 * max(count, 1), at, f"{kind} collision: {pair}", disk, "collisions")
-
-
-def thrown(scenario: Scenario, played: Trajectory) -> Verdict | None:
-    """A ghost collision: the disk hits the end of the next wall of a floor."""
-    scenario, true = answered(scenario)
-    if true is None:
-        return None
-    value, at, disk, wall = thrown_off(played, true, scenario.scene)
-    event = f"disk {disk} is thrown off the surface of wall {wall}, where two of its walls meet"
-    return read(value, at, event, disk, GHOST)
-
-
-def never_collision(played: Collisions, true: Collisions, end: float) -> tuple[float, str] | None:
-    """The first true collision up to `end` s of a pair that never collides in the run. `match`
-    leaves out such a collision near the start."""
-    hard = (true.impulse > 0) & (true.t < end)
-    missed = np.flatnonzero(hard & ~np.isin(pair_keys(true), pair_keys(played)))
-    if not len(missed):
-        return None
-    first = missed[0]
-    return float(true.t[first]), f"missed {who(true.i[first], true.j[first])}"
-
-
-USABLE = Predicate(
-    "unusable",
-    "a number is not finite, a disk goes through a wall or a disk, energy grows by 5 %, disks"
-    " overlap by a tenth of a radius, a disk in free flight moves by half its distance only (its"
-    " speed is capped, or its position has too few digits), or a collision is wrong",
-    "of the bound",
-    1.0,
-    usable,
-)
+    yield read(2.0 * max(count, 1), at, f"{kind} collision: {pair}", disk, "collisions")
 
 
 def in_steps(whole: Scenario, dt: float) -> Scenario:
@@ -216,7 +186,7 @@ def suite_case(name: str, whole: Scenario) -> Case:
         lambda x, run: in_steps(scenario(name, run), x),
         "dt",
         dense_ladder(whole),
-        USABLE,
+        unusable,
         unit="s",
         runs=SEEDS if name in RANDOM else 1,
         ratio=1.2,
@@ -227,11 +197,6 @@ def suite_case(name: str, whole: Scenario) -> Case:
 
 def with_scene(whole: Scenario, **fields: Any) -> Scenario:
     return with_oracle(replace(whole, scene=replace(whole.scene, **fields)))
-
-
-def at_speed(whole: Scenario, x: float) -> Scenario:
-    velocity, spin = whole.scene.velocity * x, whole.scene.angular_velocity * x
-    return with_scene(whole, velocity=velocity, angular_velocity=spin)
 
 
 def at_mass_ratio(whole: Scenario, x: float) -> Scenario:
@@ -286,60 +251,19 @@ def scaled_thrust(thrust: Thrust, force: float, torque: float) -> Thrust:
     return replace(thrust, force=thrust.force * force, torque=thrust.torque * torque)
 
 
-FACTORS = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1e3)
-
-
-class Varied(NamedTuple):
-    parameter: str
-    unit: str
-    values: tuple[float, ...]
-    change: Callable[[Scenario, float], Scenario]
-
-
 # what `--vary` takes
-VARIES = {
-    "dt": Varied("dt", "s", (), in_steps),
-    "speed": Varied(
-        "start velocities and spins / the file's",
-        "1",
-        (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, *FACTORS),
-        at_speed,
+VARIES: dict[str, Callable[[Scenario, float], Scenario]] = {
+    "dt": in_steps,
+    "speed": lambda whole, x: with_scene(
+        whole,
+        velocity=whole.scene.velocity * x,
+        angular_velocity=whole.scene.angular_velocity * x,
     ),
-    "mass_ratio": Varied(
-        "mass of the heaviest disk, times and divided by",
-        "1",
-        (*FACTORS, 1e4, 1e5, 1e6),
-        at_mass_ratio,
-    ),
-    "restitution": Varied(
-        "restitution",
-        "1",
-        (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 1.0),
-        lambda whole, x: with_scene(whole, restitution=x),
-    ),
-    "scale": Varied(
-        "all lengths / the file's",
-        "1",
-        (1e-3, 2e-3, 5e-3, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, *FACTORS),
-        lambda whole, x: similar(whole, size=x),
-    ),
-    "offset": Varied(
-        "displacement of the whole scene to the right",
-        "m",
-        (*FACTORS, 1e4, 1e5, 1e6),
-        lambda whole, x: similar(whole, shift=x),
-    ),
+    "mass_ratio": at_mass_ratio,
+    "restitution": lambda whole, x: with_scene(whole, restitution=x),
+    "scale": lambda whole, x: similar(whole, size=x),
+    "offset": lambda whole, x: similar(whole, shift=x),
 }
-
-
-def varied(path: str, what: str, x: float, run: int) -> Scenario:
-    """The scene of a file at the middle step of its ladder, with one quantity varied; in run 1 the
-    other way: divided by x."""
-    whole = read_scene_file(Path(path))
-    if what == "dt":
-        return in_steps(whole, x)
-    changed = VARIES[what].change(whole, 1 / x if run else x)
-    return replace(changed, substeps=(whole.middle_substeps,))
 
 
 def cannot_vary(whole: Scenario, what: str) -> str | None:
@@ -354,17 +278,38 @@ def cannot_vary(whole: Scenario, what: str) -> str | None:
     return None
 
 
+SCENES = cases_few.SCENES | cases_few.SCENES_WITH_FRICTION | cases_many.SCENES
+PREDICATES = {
+    row.name: row
+    for module in (predicates, predicates_gas)
+    for row in vars(module).values()
+    if isinstance(row, Predicate)
+}
+PLAYS = {play.__name__: play for play in (cases_few.on_spring, reversed_order, restarted)}
+
+
+def read_case(name: str, row: dict[str, Any]) -> Case:
+    """The case of a row of cases.toml."""
+    also = WITH_FRICTION_ONLY if name in cases_few.SCENES_WITH_FRICTION else ()
+    for variant in row.pop("variants", ()):
+        also += with_variant(variant)
+    row |= {key: tuple(row[key]) for key in ("values", "quick_values") if key in row}
+    play, predicate = PLAYS.get(row.pop("play", ""), once), PREDICATES[row.pop("fails")]
+    return Case(name=name, scene=SCENES[name], predicate=predicate, play=play, also=also, **row)
+
+
+TEXT = tomllib.loads(Path(__file__).with_name("cases.toml").read_text(encoding="utf-8"))
+OWN_SCENE = "A scene of your own"
+OF_OWN_SCENE = TEXT.pop(OWN_SCENE)  # parameter, unit and values of each of `VARIES`
+OF_MAPS = TEXT.pop("maps")
 FAMILIES = {
-    "One collision": COLLISIONS,
-    "One disk, or two": ALONE,
-    "Friction": FRICTION,
-    "Stacks, piles and overlaps": STACKS,
-    "A gas at e = 1": GAS,
-    "The largest dt of the suite's scenes": tuple(
+    family: [read_case(name, row) for name, row in rows.items()] for family, rows in TEXT.items()
+} | {
+    "The largest dt of the suite's scenes": [
         suite_case(name, whole)
         for name, whole in SCENARIOS.items()
         if not whole.scene.friction  # the kept limits are of the scenes without
-    ),
+    ]
 }
 CASES: dict[str, Case] = {case.name: case for cases in FAMILIES.values() for case in cases}
 FAMILY_OF = {case.name: family for family, cases in FAMILIES.items() for case in cases}
@@ -376,20 +321,25 @@ def case_named(name: str) -> Case:
     if name in CASES:
         return CASES[name]
     path, what = name.rsplit(":", 1)
-    whole, row = read_scene_file(Path(path)), VARIES[what]
-    parameter = row.parameter
+    whole, (parameter, unit, values) = read_scene_file(Path(path)), OF_OWN_SCENE[what]
     if what == "mass_ratio":
         parameter = parameter.replace("the heaviest disk", f"disk {heaviest(whole.scene)}")
     if what != "dt":
         parameter += f", at dt = {number(whole.dt(whole.middle_substeps))} s"
+
+    def scene(x: float, run: int) -> Scenario:
+        # at the middle step of its ladder; in run 1 the other way: divided by x
+        changed = VARIES[what](whole, 1 / x if run else x)
+        return changed if what == "dt" else replace(changed, substeps=(whole.middle_substeps,))
+
     return Case(
         name,
         f"{whole.name}: {whole.asks}",
-        partial(varied, path, what),
+        scene,
         parameter,
-        row.values or dense_ladder(whole),
-        USABLE,
-        row.unit,
+        tuple(values) or dense_ladder(whole),
+        unusable,
+        unit,
         runs=2 if what == "mass_ratio" else 1,
         also=WITH_FRICTION_ONLY if whole.scene.friction else (),
     )

@@ -73,7 +73,7 @@ def find_limits(
             Console(stderr=True).print(f"{expected(tasks, count)}.", highlight=False)
             resume = "The finished part is kept: give the same command again"
             with keeping(out, lambda: resume), Progress() as progress:
-                plan.carry_out(store, progress)
+                plan.carry_out(store, done, progress)
                 progress.say("writing the tables and the page")
                 try:
                     results = write_files(store)

@@ -9,11 +9,13 @@ reason that nothing shows is called likely.
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fnmatch import fnmatch
 from functools import partial
 from math import isnan
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -39,14 +41,13 @@ from crosscheck2d.reports.compare.verdicts import Verdict
 from crosscheck2d.reports.stability.cases import CASES, GHOST, similar
 from crosscheck2d.reports.stability.limits import (
     NEVER_FAILS,
-    Case,
     DrivenEngine,
     Limit,
     LimitSearch,
     play_as,
+    step_size,
 )
 from crosscheck2d.reports.stability.predicates import REFUSED, judge
-from crosscheck2d.reports.stability.reasons import LAWS, Reason, reason_of
 from crosscheck2d.scenarios.model import Array, Scenario, Scene
 from crosscheck2d.scenarios.truth.exact import with_oracle
 
@@ -58,6 +59,40 @@ MOST = 300  # disks: the ablated reference tests all pairs
 ALIKE = 2.0
 FINER = 8
 SAYS_SO = "the engine's message says so"
+
+
+class Law(NamedTuple):
+    text: str  # what happens
+    source: str
+    mechanism: str = ""
+
+
+class Reason(NamedTuple):
+    """A row of reasons.toml, which has the meaning of its fields."""
+
+    cases: str
+    engines: str
+    law: str
+    predicts: float | None = None
+    variant: str = ""
+
+    def fits(self, limit: Limit) -> bool:
+        pairs = (limit.case, self.cases), (limit.engine, self.engines)
+        return all(any(fnmatch(name, p) for p in patterns.split()) for name, patterns in pairs)
+
+
+TEXT = tomllib.loads(Path(__file__).with_name("reasons.toml").read_text(encoding="utf-8"))
+LAWS = {name: Law(*row) for name, row in TEXT["laws"].items()}
+REASONS = [Reason(**row) for row in TEXT["reasons"]]
+
+
+def reason_of(limit: Limit) -> Reason | None:
+    """The first row that fits; None if nothing failed. For a user's own scene only rows that
+    hold in every scene."""
+    if limit.verdict == NEVER_FAILS:
+        return None
+    rows = (row for row in REASONS if limit.case in CASES or row.cases == "*")
+    return next((row for row in rows if row.fits(limit)), None)
 
 
 def explained(limits: Sequence[Limit]) -> list[Limit]:
@@ -120,19 +155,18 @@ def with_replays(search: LimitSearch, limit: Limit) -> Limit:
     reason, failing = reason_of(limit), limit.failing
     if failing is None or (reason is not None and predicted(limit, reason)):
         return limit
-    if reason is not None:
-        return replace(limit, mechanisms=sufficient_mechanisms(search, limit))
     alone = limit.engine.endswith(":shipped") and not limit.case.startswith("dt_")
-    settings_first, cause = alone or limit.case not in CASES, None
-    if settings_first:
+    settings = None
+    if reason is None and (alone or limit.case not in CASES):
         if cause := cause_by_intervention(search, limit, INTERVENTIONS[:1]):
             return replace(limit, cause=cause)
-        cause = cause_by_settings(search, limit)
-        if cause.kind is CauseKind.SETTING:
-            return replace(limit, cause=cause)
-    if mechanisms := sufficient_mechanisms(search, limit):
+        settings = cause_by_settings(search, limit)
+        if settings.kind is CauseKind.SETTING:
+            return replace(limit, cause=settings)
+    mechanisms = sufficient_mechanisms(search, limit)
+    if mechanisms or reason is not None:
         return replace(limit, mechanisms=mechanisms)
-    settings = cause or cause_by_settings(search, limit)
+    settings = settings or cause_by_settings(search, limit)
     if settings.kind is CauseKind.SETTING:
         return replace(limit, cause=settings)
     cause = cause_by_intervention(search, limit, INTERVENTIONS)
@@ -152,67 +186,56 @@ def sufficient_mechanisms(search: LimitSearch, limit: Limit) -> tuple[str, ...]:
     Tried in this order: end-of-step detection alone; each mechanism alone (with those it acts
     on); all mechanisms, from which those that are not needed are then removed.
     """
-    ablations = Ablations.of(search, limit)
-    if ablations is None:
+    known, has_limit = ablations(search, limit)
+    if has_limit is None:
         return ()
-    known = ablations.mechanisms
     for alone in ([], *([*(x for x in known if x.name in top.on_top), top] for top in known)):
-        if ablations.alike(alone):
+        if has_limit(alone):
             return tuple(mechanism.name for mechanism in alone) or (LATE,)
-    if not known or not ablations.alike(known):
+    if not known or not has_limit(known):
         return ()
-    return tuple(mechanism.name for mechanism in ablations.needed())
+    needed = known
+    for mechanism in known:
+        fewer = [x for x in needed if x is not mechanism and mechanism.name not in x.on_top]
+        needed = fewer if has_limit(fewer) else needed
+    return tuple(mechanism.name for mechanism in needed)
 
 
-@dataclass(frozen=True)
-class Ablations:
-    case: Case
-    bad: Scenario  # the first run that failed
-    good: list[Scenario]  # all runs at the nearest value that works, if the engine works anywhere
-    mechanisms: list[Mechanism]  # of the engine
-    verdict: Verdict  # on the engine's failing run
+def ablations(
+    search: LimitSearch, limit: Limit
+) -> tuple[list[Mechanism], Callable[[Sequence[Mechanism]], bool] | None]:
+    """The mechanisms of the engine, and whether the reference with some of them has its limit: it
+    fails as the engine does in the first run that failed, and works at the nearest value where the
+    engine works; where that works nowhere, it reads as much as the engine. None if nothing failed,
+    nothing was played, or the engine has no known mechanisms.
+    """
+    failure, failing, case = search.seen.get(limit.fails_at), limit.failing, search.case
+    name, _, variant = search.engine.partition("+")
+    if failure is None or failing is None or name not in MECHANISMS:
+        return [], None
+    judged, run = failure
+    bad = case.scene(limit.fails_at, failing.first)
+    if run.trajectory is None or bad.scene.n > MOST:
+        return [], None
+    works = not isnan(limit.works_at)
+    good = [case.scene(limit.works_at, run) for run in range(failing.runs if works else 0)]
+    known = [] if variant else mechanisms_of(name, run.settings, bad.scene, step_size(bad))
+    of_engine = judge(case.predicate, judged, run)
 
-    @staticmethod
-    def of(search: LimitSearch, limit: Limit) -> Ablations | None:
-        """None if nothing failed, nothing was played, or the engine has no known mechanisms."""
-        failure, failing = search.seen.get(limit.fails_at), limit.failing
-        name, _, variant = search.engine.partition("+")
-        if failure is None or failing is None or name not in MECHANISMS:
-            return None
-        (judged, run), scene = failure, search.case.scene
-        bad = scene(limit.fails_at, failing.first)
-        if run.trajectory is None or bad.scene.n > MOST:
-            return None
-        works = not isnan(limit.works_at)
-        good = [scene(limit.works_at, run) for run in range(failing.runs if works else 0)]
-        dt = bad.dt(bad.substeps[0])
-        known = [] if variant else mechanisms_of(name, run.settings, bad.scene, dt)
-        mechanisms = [mechanism for mechanism in known if mechanism.parameters]
-        verdict = judge(search.case.predicate, judged, run)
-        return Ablations(search.case, bad, good, mechanisms, verdict)
-
-    def needed(self) -> list[Mechanism]:
-        # one after the other each is removed without which the ablation still has the limit
-        needed = self.mechanisms
-        for mechanism in self.mechanisms:
-            fewer = [x for x in needed if x is not mechanism and mechanism.name not in x.on_top]
-            needed = fewer if self.alike(fewer) else needed
-        return needed
-
-    def alike(self, mechanisms: Sequence[Mechanism]) -> bool:
-        """Whether the ablation fails as the engine does at the limit, and works where the engine
-        works."""
-        verdict = self.judge(self.bad, mechanisms)
-        if not verdict.failed or verdict.id != self.verdict.id:
-            return False
-        if self.good:
-            failed = sum(self.judge(scenario, mechanisms).failed for scenario in self.good)
-            return failed <= self.case.by_chance * len(self.good)
-        return 1 / ALIKE <= verdict.value / self.verdict.value <= ALIKE
-
-    def judge(self, scenario: Scenario, mechanisms: Sequence[Mechanism]) -> Verdict:
+    def verdict_on(scenario: Scenario, mechanisms: Sequence[Mechanism]) -> Verdict:
         ablation = DrivenEngine("reference:ablation", partial(with_mechanisms, mechanisms))
-        return judge(self.case.predicate, *self.case.play(ablation, scenario))
+        return judge(case.predicate, *case.play(ablation, scenario))
+
+    def has_limit(mechanisms: Sequence[Mechanism]) -> bool:
+        verdict = verdict_on(bad, mechanisms)
+        if not verdict.failed or verdict.id != of_engine.id:
+            return False
+        if good:
+            failed = sum(verdict_on(scenario, mechanisms).failed for scenario in good)
+            return failed <= case.by_chance * len(good)
+        return 1 / ALIKE <= verdict.value / of_engine.value <= ALIKE
+
+    return [mechanism for mechanism in known if mechanism.parameters], has_limit
 
 
 def finer(scenario: Scenario, times: int = FINER) -> Scenario:
@@ -240,22 +263,14 @@ def joined(scenario: Scenario) -> Scenario:
 
 
 class Intervention(NamedTuple):
-    """One change to a failing run.
+    """One change to a failing run."""
 
-    Attributes:
-        engines, varied: patterns of engines and of what is varied, for which it is tried.
-        reason: why it failed, if it works with the change; None: that is not known.
-        how: the change in words.
-        change: what is done to the scene, if anything.
-        engine: that plays it instead, if another does.
-    """
-
-    engines: str
+    engines: str  # patterns of engines and of what is varied, for which it is tried
     varied: str
-    reason: str | None
-    how: str
-    change: Callable[[Scenario], Scenario] | None = None
-    engine: str | None = None
+    reason: str | None  # why it failed, if it works with the change; None: that is not known
+    how: str  # the change in words
+    change: Callable[[Scenario], Scenario] | None = None  # of the scene, if anything
+    engine: str | None = None  # that plays it instead, if another does
 
     def fits(self, engine: str, varied: str) -> bool:
         return fnmatch(engine, self.engines) and fnmatch(varied, self.varied)
@@ -320,8 +335,8 @@ def cause_by_settings(search: LimitSearch, limit: Limit) -> Cause:
             return share if share > 1.0 else np.inf
         return float(np.fmin(share, 1.0))  # nan: there is nothing to judge
 
-    dt = scenario.dt(scenario.substeps[0])
-    remedy = find_remedy(settings_of(search.engine, scenario.scene, dt), error, bound=1.0)
+    settings = settings_of(search.engine, scenario.scene, step_size(scenario))
+    remedy = find_remedy(settings, error, bound=1.0)
     if remedy.settings and remedy.after <= 1.0:
         return Cause(CauseKind.SETTING, remedy.sentence(search.engine), shown="works with it")
     return Cause(CauseKind.UNKNOWN, remedy._replace(settings=()).sentence(""))

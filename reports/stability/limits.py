@@ -23,25 +23,24 @@ from crosscheck2d.scenarios.model import Scenario, Scene
 
 
 class DrivenEngine(NamedTuple):
-    """An engine or a variant: its name, `engine:profile` or `engine:profile+variant`; the function
-    that makes it; and what is changed in it, "" for an engine as in its row."""
+    """An engine or a variant that plays a case."""
 
-    name: str
+    name: str  # `engine:profile`, or `engine:profile+variant`
     make: Callable[[], Engine]
-    change: str = ""
+    change: str = ""  # of a variant: what is changed in it
 
 
 def make_variant(name: str, variant: str) -> Any:
     # changed at once, and right after `load`
-    settings, _, loaded = ENGINES[name].variants[variant]
+    settings, _, change = ENGINES[name].variants[variant]
     engine: Any = changed(name, **settings)
-    if loaded is None:
+    if change is None:
         return engine
-    load, change = engine.load, loaded
+    load, after = engine.load, change
 
     def load_and_change(scene: Scene, dt: float) -> None:
         load(scene, dt)
-        change(engine)
+        after(engine)
 
     engine.load = load_and_change
     return engine
@@ -52,14 +51,9 @@ def with_variant(variant: str) -> tuple[str, ...]:
 
 
 WITH_FRICTION_ONLY = tuple(name for name, row in ENGINES.items() if row.adds_friction)
-
-# `engine:profile`, and after all of these `engine:profile+variant` -> the engine.
-DRIVEN_ENGINES: dict[str, DrivenEngine] = {
-    name: DrivenEngine(name, row.make) for name, row in ENGINES.items()
-} | {
-    f"{name}+{variant}": DrivenEngine(
-        f"{name}+{variant}", partial(make_variant, name, variant), what
-    )
+# the engines, and after all of these the variants
+DRIVEN_ENGINES = {name: DrivenEngine(name, row.make) for name, row in ENGINES.items()} | {
+    (key := f"{name}+{variant}"): DrivenEngine(key, partial(make_variant, name, variant), what)
     for name, row in ENGINES.items()
     for variant, (_, what, _) in row.variants.items()
 }
@@ -78,8 +72,13 @@ def taking_part(rows: Mapping[str, EngineRow]) -> Iterator[None]:
             del ENGINES[name], DRIVEN_ENGINES[name]
 
 
+def step_size(scenario: Scenario) -> float:
+    """s, the only one of a case's scenario."""
+    return scenario.dt(scenario.substeps[0])
+
+
 def played(driven: DrivenEngine, scenario: Scenario) -> Run:
-    return play_once(driven.make, driven.name, scenario, scenario.dt(scenario.substeps[0]))
+    return play_once(driven.make, driven.name, scenario, step_size(scenario))
 
 
 def play_as(engine: str, scenario: Scenario) -> Run:
@@ -101,10 +100,6 @@ class Form:
     timeout: float  # s that a case may take on one engine
 
 
-# A gas meets a bad cluster of contacts sooner or later: one in 20 of pymunk's gases is off by 1 %
-# from v dt = 0.25 R on, half of them not up to 2 R. The first failure depends on the seed; the
-# value at which more than a quarter of the seeds fail does not.
-RARELY = 1 / 4
 ALL = 10**6  # runs: more than any case has
 QUICK = Form("quick", few=4, ratio=1.05, whole=False, timeout=600.0)
 FULL = Form("full", few=ALL, ratio=1.01, whole=True, timeout=3600.0)
@@ -117,51 +112,35 @@ def once(driven: DrivenEngine, scenario: Scenario) -> tuple[Scenario, Run]:
 
 @dataclass(frozen=True)
 class Case:
-    """One way to fail: a row of the stability report.
+    """One way to fail: a row of the stability report."""
 
-    Attributes:
-        name: lower-case words, as they stand in limits.csv.
-        asks: the question in one sentence.
-        scene: (value, number of the run from 0) -> the scenario; it is played at its only step
-            size. Fewer runs are the first of more.
-        parameter: what is varied, dimensionless where it can be.
-        values: to scan, from gentle to harsh.
-        predicate: decides whether a run fails.
-        unit: of the parameter; "1" for a ratio.
-        runs: at a value: 1 where nothing differs, else phases of the collision within a step, or
-            seeds.
-        whole: whether the parameter counts something.
-        also: variants, keys of `DRIVEN_ENGINES`, that play it besides the engines of `ENGINES`.
-        play: engine and scenario -> the run and what it is judged by, where that takes more than
-            one call of `play`.
-        quick_values: to scan in the quick form, where a run is long: some of `values`.
-        refines: whether the first edge is bisected, and the full form scans between the values (not
-            with `by_chance`).
-        ratio: how close the bracket is made at best, where a run is long or what is sampled differs
-            much.
-        by_chance: share of the runs at a value that may fail by chance, where what is read is a
-            statistic or the worst of it depends on what is sampled.
-        shown_with: what a failing run is shown with.
-        report: a scene of the report that asks something alike; `overview.in_report` says how the
-            two differ.
-    """
-
-    name: str
-    asks: str
+    name: str  # lower-case words, as they stand in limits.csv
+    asks: str  # the question in one sentence
+    # (value, number of the run from 0) -> what is played at its only step size; fewer runs are the
+    # first of more
     scene: Callable[[float, int], Scenario]
-    parameter: str
-    values: tuple[float, ...]
-    predicate: Predicate
-    unit: str = "1"
+    parameter: str  # what is varied, dimensionless where it can be
+    values: tuple[float, ...]  # to scan, from gentle to harsh
+    predicate: Predicate  # decides whether a run fails
+    unit: str = "1"  # of the parameter; "1" for a ratio
+    # at a value: 1 where nothing differs, else phases of the collision within a step, or seeds
     runs: int = 1
-    whole: bool = False
+    whole: bool = False  # whether the parameter counts something
+    # variants, keys of `DRIVEN_ENGINES`, that play it besides the engines of `ENGINES`
     also: tuple[str, ...] = ()
+    # the run and what it is judged by, where that takes more than one call of `play`
     play: Callable[[DrivenEngine, Scenario], tuple[Scenario, Run]] = once
-    quick_values: tuple[float, ...] = ()
+    quick_values: tuple[float, ...] = ()  # in the quick form, where a run is long: some of `values`
+    # whether the first edge is bisected, and the full form scans between the values (not with
+    # `by_chance`)
     refines: bool = True
+    # how close the bracket is made at best, where a run is long or what is sampled differs much
     ratio: float = 1.0
+    # share of the runs at a value that may fail by chance, where what is read is a statistic or the
+    # worst of it depends on what is sampled
     by_chance: float = 0.0
-    shown_with: str = EXACT
+    shown_with: str = EXACT  # what a failing run is shown with
+    # a scene of the report that asks something alike; `in_report` says how the two differ
     report: str = ""
 
     @property
@@ -201,24 +180,21 @@ class Case:
 
 @dataclass(frozen=True)
 class Trial:
-    """The runs at one value: how many were played, how many failed, the worst reading, and the
-    first that failed: when, what happened, the id of its verdict, and the disk (-1: all).
-
-    Up to `allowed` of them may fail by chance. `left`: whether the search stopped at a failure
-    before it played all runs.
-    """
+    """The runs at one value."""
 
     value: float
-    runs: int
+    runs: int  # how many were played
     failed: int
-    worst: float
+    worst: float  # reading
+    # the first that failed: its number, when it did, what happened, the id of its verdict, and the
+    # disk (-1: all)
     first: int = -1
     at: float = nan
     event: str = ""
     broken: str = ""
     disk: int = 0
-    allowed: int = 0
-    left: bool = False
+    allowed: int = 0  # how many may fail by chance
+    left: bool = False  # whether the search stopped at a failure before it played all runs
 
     @property
     def works(self) -> bool:
@@ -227,44 +203,30 @@ class Trial:
 
 @dataclass(frozen=True)
 class Limit:
-    """What a search found.
-
-    Attributes:
-        case, engine: names; the engine is a key of `DRIVEN_ENGINES`.
-        form: of `FORMS`.
-        verdict: "limit", "does not fail" (up to works_at), "never works" (from fails_at on, but for
-            a few values), or "works only beyond" (at works_at, and not at the gentler fails_at).
-        works_at: the harshest value before the first failure, where all runs of the form were
-            played; nan: none.
-        fails_at: the first failure on the way from gentle to harsh: more runs failed than may by
-            chance; nan: none.
-        trials: every value tried, from gentle to harsh.
-        monotone: False if there is more than one edge among the values tried: it works again
-            beyond, or fails at the gentlest as well.
-        spacing: the resolution: the largest ratio of two neighbours among the values tried, up to
-            the first failure.
-        mechanisms: with which the reference has this limit, as `sufficient_mechanisms`; () if none
-            were found, or looked for.
-        cause: why it fails; None where nothing failed.
-        replay, ratio: of the first failing run, packed for the page, and its height over its width;
-            "" if there is none.
-        status: "ok", or why the search was lost, as in `STATUSES` of run.py.
-    """
+    """What a search found."""
 
     case: str
-    engine: str
-    form: str
+    engine: str  # a key of `DRIVEN_ENGINES`
+    form: str  # a key of `FORMS`
+    # "limit", "does not fail" (up to works_at), "never works" (from fails_at on, but for a few
+    # values), or "works only beyond" (at works_at, and not at the gentler fails_at)
     verdict: str
-    works_at: float
+    works_at: float  # the harshest value before the first failure; nan: none
+    # the gentlest value at which more runs failed than may by chance; nan: none
     fails_at: float
-    trials: tuple[Trial, ...]
+    trials: tuple[Trial, ...]  # every value tried, from gentle to harsh
+    # False if there is more than one edge among the values tried: it works again beyond, or fails
+    # at the gentlest as well
     monotone: bool = True
+    # the resolution: the largest ratio of two neighbours among the values tried, up to the first
+    # failure
     spacing: float = nan
+    # with which the reference has this limit, as `sufficient_mechanisms`
     mechanisms: tuple[str, ...] = ()
-    cause: Cause | None = None
-    replay: str = ""
-    ratio: float = 1.0
-    status: str = "ok"
+    cause: Cause | None = None  # why it fails; None where nothing failed
+    replay: str = ""  # the first failing run, packed for the page, if there is one
+    ratio: float = 1.0  # height over width of the replay
+    status: str = "ok"  # or why the search was lost, as in `STATUSES` of run.py
 
     @property
     def failing(self) -> Trial | None:

@@ -3,18 +3,21 @@ and a few sentences with counts."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import tomllib
+from collections.abc import Sequence
 from itertools import groupby
 from math import isnan
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.reports.page.scenes import LOST, is_library
 from crosscheck2d.reports.page.style import number
-from crosscheck2d.reports.stability.cases_friction import FRICTION
+from crosscheck2d.reports.stability import cases_few
 from crosscheck2d.reports.stability.limits import (
-    LIMIT,
     NEVER_FAILS,
     NEVER_WORKS,
     ONLY_BEYOND,
@@ -26,15 +29,10 @@ from crosscheck2d.reports.terminal.counts import counted, listed
 from crosscheck2d.scenarios.catalogue import scenario
 from crosscheck2d.scenarios.model import Scenario
 
-WITH_FRICTION = {case.name for case in FRICTION}
-MARKS = {
-    "–": "did not fail at any value tried",
-    "everywhere": "fails at every value, with * at most of them",
-    "refused": "the engine does not play the scene, or not from a value on",
-    "≤": "fails at this value and below, works above",
-    "≥": "fails at this value and above, works below",
-    "*": "works again at a harsher value, or also fails at the gentlest value",
-}
+WORDS: dict[str, Any] = tomllib.loads(
+    Path(__file__).with_name("words.toml").read_text(encoding="utf-8")
+)
+MARKS: dict[str, str] = WORDS["marks"]
 
 
 def in_words(limit: Limit) -> str:
@@ -100,20 +98,16 @@ def in_report(case: Case) -> str:
     if not case.report:
         return ""
     reported, here = scenario(case.report), case.scene(case.values[0], 0)
-    dt = number(1e3 * reported.dt(reported.middle_substeps))
-    dt_here = held(case).get("dt")
-    varies = f"dt is {dt_here}" if dt_here else "dt is varied"
-    if np.array_equal(reported.scene.position, here.scene.position):
-        differ = f"the same scene, at dt {dt} ms; here {varies}"
-    else:
-        differ = f"another scene: {setting(reported)}, at dt {dt} ms; here {setting(here)}, and"
-        differ += f" {varies}"
-    return (
-        f"{case.report} is {differ}. In the report an engine fails if a disk is more than"
-        f" {number(LOST)} radius from its exact position, or if there is no result. Here it"
-        f" fails if {case.predicate.means}. So an engine may fail here and not in the report, or"
-        " the other way round."
+    dt, dt_here = number(1e3 * reported.dt(reported.middle_substeps)), held(case).get("dt")
+    same = np.array_equal(reported.scene.position, here.scene.position)
+    text: str = WORDS["same_scene" if same else "other_scene"].format(
+        name=case.report,
+        dt=dt,
+        varies=f"dt is {dt_here}" if dt_here else "dt is varied",
+        there=setting(reported),
+        here=setting(here),
     )
+    return text + str(WORDS["in_report"].format(number(LOST), case.predicate.means))
 
 
 def setting(scene: Scenario) -> str:
@@ -122,60 +116,57 @@ def setting(scene: Scenario) -> str:
 
 def findings(limits: Sequence[Limit]) -> list[str]:
     limits = [limit for limit in limits if limit.engine in ENGINES]
-    cases = {limit.case for limit in limits}
-    failing = [limit for limit in limits if limit.verdict != NEVER_FAILS]
-    nowhere = [limit for limit in limits if limit.verdict == NEVER_WORKS]
-    bracketed = [limit for limit in limits if limit.verdict in (LIMIT, ONLY_BEYOND)]
-    refused = sum(limit.refused for limit in (*nowhere, *bracketed))
+    columns = "case engine failed nowhere refused tested lost friction"
+    table = pd.DataFrame(
+        [
+            (
+                *(limit.case, limit.engine, limit.verdict != NEVER_FAILS),
+                *(limit.verdict == NEVER_WORKS, limit.refused),
+                *(bool(limit.cause and limit.cause.shown), limit.status != "ok"),
+                limit.case in cases_few.SCENES_WITH_FRICTION,
+            )
+            for limit in limits
+        ],
+        columns=columns.split(),
+    )
+    failed, limited = int(table.failed.sum()), table.failed & ~table.refused
     sentences = [
-        f"{counted(len(limits), 'search', 'searches')} in {counted(len(cases), 'case')}:"
-        f" {len(limits) - len(failing)} found no failure at any value tried,"
-        f" {sum(not limit.refused for limit in bracketed)} found a limit,"
-        f" {sum(not limit.refused for limit in nowhere)} failed at every value, and in {refused}"
-        " the engine refused to play, at every value or from one on."
-    ]
-    rough = [limit for limit in limits if limit.case in WITH_FRICTION]
-    smooth = [limit for limit in limits if limit.case not in WITH_FRICTION]
-    sentences += fewest_and_most(smooth, " without friction" if rough else "")
-    sentences += fewest_and_most(rough, " with friction")
-    if failing:
-        shown = sum(bool(limit.cause and limit.cause.shown) for limit in failing)
-        sentences.append(
-            f"The reason of {shown} of {counted(len(failing), 'limit')} was tested in one of four"
-            " ways. The limit follows from the reason; an engine that differs in this one thing"
-            " works at harsher values; the failing run works without this thing; or the ablated"
-            " reference, with as few mechanisms of the engine as possible, works and fails at the"
-            " same values. The other reasons are called likely, or not known."
+        WORDS["found"].format(
+            counted(len(table), "search", "searches"),
+            counted(table.case.nunique(), "case"),
+            len(table) - failed,
+            (limited & ~table.nowhere).sum(),
+            (limited & table.nowhere).sum(),
+            table.refused.sum(),
         )
+    ]
+    rough, smooth = table[table.friction], table[~table.friction]
+    sentences += fewest_and_most(smooth, " without friction" if len(rough) else "")
+    sentences += fewest_and_most(rough, " with friction")
+    if failed:
+        tested = (table.failed & table.tested).sum()
+        sentences.append(WORDS["tested"].format(tested, counted(failed, "limit")))
     if odd := [limit for limit in limits if not limit.monotone]:
         names = ", ".join(dict.fromkeys(f"{limit.engine} in {limit.case}" for limit in odd[:3]))
-        sentences.append(
-            f"In {counted(len(odd), 'search', 'searches')} (marked *) the engine works again beyond"
-            f" its first failure, for example {names}. The table has the first failure."
-        )
+        sentences.append(WORDS["again"].format(counted(len(odd), "search", "searches"), names))
     return sentences
 
 
-def fewest_and_most(limits: Sequence[Limit], which: str) -> list[str]:
+def fewest_and_most(table: pd.DataFrame, which: str) -> list[str]:
     # among those that model any of these cases; libraries apart if all in front are this project's
-    taken = [x for x in limits if not (x.verdict == NEVER_WORKS and x.refused) or x.status != "ok"]
-    fails = dict.fromkeys((limit.engine for limit in taken), 0)
-    for limit in limits:
-        if limit.engine in fails:
-            fails[limit.engine] += limit.verdict != NEVER_FAILS
-    cases = len({limit.case for limit in limits})
-    if cases < 2 or not any(fails.values()):
+    taken = table[~(table.nowhere & table.refused) | table.lost].engine.unique()
+    fails = table[table.engine.isin(taken)].groupby("engine", sort=False).failed.sum()[taken]
+    cases = table.case.nunique()
+    if cases < 2 or not fails.any():
         return []
     these = f"the {cases} cases{which}" if which else f"these {cases} cases"
-    sentence = f"In {these} the fewest failures are those of {engines_with(fails, min)}, the most"
-    sentence += f" are those of {engines_with(fails, max)}. A refusal counts as a failure."
-    libraries = {engine: count for engine, count in fails.items() if is_library(engine)}
-    if libraries and min(libraries.values()) > min(fails.values()):
-        sentence += f" Of the libraries, the fewest are those of {engines_with(libraries, min)}."
+    ends = (engines_with(fails, end) for end in (fails.min(), fails.max()))
+    sentence: str = WORDS["fewest"].format(these, *ends)
+    libraries = fails[[is_library(engine) for engine in fails.index]]
+    if len(libraries) and libraries.min() > fails.min():
+        sentence += WORDS["libraries"].format(engines_with(libraries, libraries.min()))
     return [sentence]
 
 
-def engines_with(fails: Mapping[str, int], extreme: Callable[[Iterable[int]], int]) -> str:
-    count = extreme(fails.values())
-    names = [engine for engine, number in fails.items() if number == count]
-    return f"{listed(names)} ({count})"
+def engines_with(fails: pd.Series[int], count: int) -> str:
+    return f"{listed(list(fails.index[fails == count]))} ({count})"

@@ -28,23 +28,22 @@ REFUSED = "refused"
 MOST_SPEED = 10.0  # radii/s
 
 
+Reading = Callable[[Scenario, Trajectory], Verdict]  # of a run that was played to its end
+
+
 class Predicate(NamedTuple):
-    """A run fails if its number is above `bound`, or is not a number.
+    """A run fails if its number is above `bound`, or is not a number."""
 
-    Attributes:
-        name: the id of its verdict, as it stands in limits.csv.
-        means: what failing is, as a part of a sentence.
-        unit: of the number.
-        bound: the largest that still works.
-        read: scenario and run, played to its end -> the verdict. A verdict of another name says
-            what in particular has failed.
-    """
+    name: str  # the id of its verdict, as it stands in limits.csv
+    means: str  # what failing is, as a part of a sentence
+    unit: str  # of the number
+    bound: float  # the largest that still works
+    read: Reading  # a verdict of another name says what in particular has failed
 
-    name: str
-    means: str
-    unit: str
-    bound: float
-    read: Callable[[Scenario, Trajectory], Verdict]
+
+def predicate(means: str, unit: str, bound: float) -> Callable[[Reading], Predicate]:
+    """Makes a function a predicate of its name."""
+    return lambda read: Predicate(read.__name__.replace("_", " "), means, unit, bound, read)
 
 
 def judge(predicate: Predicate, scenario: Scenario, run: Run) -> Verdict:
@@ -96,6 +95,7 @@ def worst_disk(series: Array) -> int:
     return int(np.nanargmax(series)) if np.isfinite(series).any() else 0
 
 
+@predicate("a disk passes through a disk or a wall that it should collide with", "collisions", 0.0)
 def collisions_missed(scenario: Scenario, played: Trajectory) -> Verdict:
     true = truth_of(scenario)
     expected, change = (laws.lengths(x.velocity[-1] - x.velocity[0]) for x in (true, played))
@@ -105,12 +105,14 @@ def collisions_missed(scenario: Scenario, played: Trajectory) -> Verdict:
     return read(float(missed), at, f"the collision is missed: {through}")
 
 
-def collisions_spurious(scenario: Scenario, played: Trajectory) -> Verdict:
+@predicate("a disk that touches nothing is deflected", "of the speed", 1e-3)
+def spurious_collisions(scenario: Scenario, played: Trajectory) -> Verdict:
     change = laws.lengths(played.velocity - played.velocity[0]).max(axis=1)
     share = change / laws.lengths(scenario.scene.velocity).max()
     return largest(played.t, share, 1e-3, "a spurious collision: the disks do not touch")
 
 
+@predicate("the collision does not have the scene's e", "1", 0.01)
 def restitution_off(scenario: Scenario, played: Trajectory) -> Verdict:
     start, end = (float(v[0, 0] - v[1, 0]) for v in (played.velocity[0], played.velocity[-1]))
     e = -end / start
@@ -118,6 +120,7 @@ def restitution_off(scenario: Scenario, played: Trajectory) -> Verdict:
     return read(abs(e - scenario.scene.restitution), at, f"the collision has e = {e + 0.0:.3g}")
 
 
+@predicate("a free disk has not moved the right distance", "of the way", 0.01)
 def wrong_distance(scenario: Scenario, played: Trajectory) -> Verdict:
     true = truth_of(scenario)
     way, expected = (laws.lengths(x.position[-1] - x.position[0]) for x in (played, true))
@@ -127,6 +130,7 @@ def wrong_distance(scenario: Scenario, played: Trajectory) -> Verdict:
     return read(off[disk], played.t[-1], event)
 
 
+@predicate("a disk leaves the collision with a wrong velocity", "of the speed", 1e-3)
 def velocity_off(scenario: Scenario, played: Trajectory) -> Verdict:
     true = truth_of(scenario)
     off = laws.lengths(played.velocity[-1] - true.velocity[-1])
@@ -136,12 +140,14 @@ def velocity_off(scenario: Scenario, played: Trajectory) -> Verdict:
     return read(share[disk], true.collisions.t[0], f"disk {disk} leaves with a wrong velocity")
 
 
-def scaled_deviation(scenario: Scenario, played: Trajectory) -> Verdict:
+@predicate("the path, scaled back, differs from that at scale 1", "radii", 0.25)
+def deviation(scenario: Scenario, played: Trajectory) -> Verdict:
     off = laws.lengths(played.position - truth_of(scenario).position) / scenario.scene.radius
     event = "from here the path differs from that at scale 1"
-    return largest(played.t, off.max(axis=1), SCALED_DEVIATION.bound, event)
+    return largest(played.t, off.max(axis=1), deviation.bound, event)
 
 
+@predicate("the angle of a free disk does not follow its spin", "of the angle", 0.02)
 def angle_off(scenario: Scenario, played: Trajectory) -> Verdict:
     turned = played.t * scenario.scene.angular_velocity[0]
     off = np.abs(played.angle[:, 0] - turned)[1:] / turned[1:]
@@ -149,16 +155,18 @@ def angle_off(scenario: Scenario, played: Trajectory) -> Verdict:
     return read(off[-1], played.t[1], event)
 
 
+@predicate("the energy of an oscillator doubles or halves", "doublings of energy", 1.0)
 def spring_grows(_: Scenario, played: Trajectory) -> Verdict:
     energy = (played.velocity**2 + played.position**2).sum(axis=(1, 2)) / 2  # of 1 kg on 1 N/m
     quarter = len(energy) // 4
     # Means over a quarter of the run: the energy of a stable method oscillates within a period.
     factor = float(energy[-quarter:].mean() / energy[:quarter].mean())
-    at = first_above(played.t, np.abs(np.log2(energy / energy[0])), SPRING_GROWS.bound)
+    at = first_above(played.t, np.abs(np.log2(energy / energy[0])), spring_grows.bound)
     event = f"after 300 steps the energy is {factor:.3g} times that at the start"
     return read(abs(float(np.log2(factor))), at, event)
 
 
+@predicate("a bounce changes the height that the ball reaches", "of the height", MOST_BOUNCE)
 def bounce_off(scenario: Scenario, played: Trajectory) -> Verdict:
     scene, y = scenario.scene, played.position[:, 0, 1] - scenario.scene.radius[0]
     heights = laws.apexes(y)[1] / y[0]  # of each flight, the drop itself first
@@ -177,6 +185,7 @@ def bounce_off(scenario: Scenario, played: Trajectory) -> Verdict:
     return read(np.abs(changes[worst]), first, event)
 
 
+@predicate("the impulse of friction is not that of Coulomb's law", "of the impulse", 0.1)
 def friction_off(scenario: Scenario, played: Trajectory) -> Verdict:
     true, scene = truth_of(scenario), scenario.scene
     impulse, expected = friction_impulses(played, scene), friction_impulses(true, scene)
@@ -198,6 +207,7 @@ def friction_impulses(trajectory: Trajectory, scene: Scene) -> Array:
     return np.array([scene.mass * dv, scene.inertia * dw / scene.radius])
 
 
+@predicate("a disk does not roll at the right speed after it has slid", "of the start speed", 0.01)
 def rolling_off(scenario: Scenario, played: Trajectory) -> Verdict:
     scene = scenario.scene
     speed, rim = (
@@ -207,24 +217,26 @@ def rolling_off(scenario: Scenario, played: Trajectory) -> Verdict:
     off = np.abs(speed - rim).max(axis=0) / np.abs(scene.velocity[0, 0])
     moves, turns = speed[:, -1] / rim[:, -1]
     event = f"it moves at {moves:.4g}, and its rim at {turns:.4g}, of the speed of rolling"
-    return read(off[-1], first_above(played.t, off, ROLLING_OFF.bound), event)
+    return read(off[-1], first_above(played.t, off, rolling_off.bound), event)
 
 
+@predicate("a disk slips on a slope on which it should roll", "of the speed", 0.05)
 def slips(scenario: Scenario, played: Trajectory) -> Verdict:
     along = played.velocity[1:, 0, 0]
     slip = along + scenario.scene.radius[0] * played.angular_velocity[1:, 0]
     share = np.abs(slip) / np.where(along, np.abs(along), np.nan)
-    at = first_above(played.t[1:], share, SLIPS.bound)
+    at = first_above(played.t[1:], share, slips.bound)
     return read(share[-1], at, f"the rim slips at {share[-1]:.3g} of the speed of the disk")
 
 
+@predicate("a disk at rest moves or turns after the first tenth of the run", "radii", 0.01)
 def creeps(scenario: Scenario, played: Trajectory) -> Verdict:
     first = int(np.ceil(SETTLED * (len(played) - 1)))
     x, turned = played.position[:, 0], played.angle[:, 0]
     radius = scenario.scene.radius[0]
     moved = np.hypot(*(x - x[first]).T) / radius + np.abs(turned - turned[first])
     moved[:first] = 0.0
-    return largest(played.t, moved, CREEPS.bound, f"it has moved by {moved.max():.3g} radii")
+    return largest(played.t, moved, creeps.bound, f"it has moved by {moved.max():.3g} radii")
 
 
 def fastest(played: Trajectory, scene: Scene) -> Array:
@@ -233,7 +245,8 @@ def fastest(played: Trajectory, scene: Scene) -> Array:
     return speed
 
 
-def stands(scenario: Scenario, played: Trajectory) -> Verdict:
+@predicate("a disk sinks by 0.1 radii, or jitters at 0.02 sqrt(g R)", "of the bound", 1.0)
+def does_not_stand(scenario: Scenario, played: Trajectory) -> Verdict:
     half, moved = len(played) // 2, laws.lengths(played.position - played.position[0])
     radii = (moved / scenario.scene.radius).max(axis=1)
     worst = int(np.argmax(moved[-1]))
@@ -249,17 +262,20 @@ def stands(scenario: Scenario, played: Trajectory) -> Verdict:
     )
 
 
+@predicate("two disks that start at rest separate at a speed", "radii/s", 0.1)
 def ejected(scenario: Scenario, played: Trajectory) -> Verdict:
     speed = fastest(played, scenario.scene)
-    at = first_above(played.t, speed, EJECTED.bound)
+    at = first_above(played.t, speed, ejected.bound)
     return read(speed[-1], at, f"the disks separate at {speed[-1]:.3g} radii/s")
 
 
-def still_overlaps(scenario: Scenario, played: Trajectory) -> Verdict:
+@predicate("an overlap is left after a second", "radii", 0.02)
+def still_overlap(scenario: Scenario, played: Trajectory) -> Verdict:
     overlap = float(laws.penetration(played, scenario.scene)[-1])
     return read(overlap, played.t[-1], f"an overlap of {overlap:.3g} radii is left")
 
 
+@predicate("a disk leaves the box, or flies at 10 radii/s", "of the bound", 1.0)
 def bursts(scenario: Scenario, played: Trajectory) -> Verdict:
     walls, x = scenario.scene.walls, played.position
     low, high = walls.min(axis=(0, 1)), walls.max(axis=(0, 1))
@@ -274,112 +290,9 @@ def bursts(scenario: Scenario, played: Trajectory) -> Verdict:
     )
 
 
+@predicate("a disk that should be at rest moves", "sqrt(g R)", MOST_RESIDUAL)
 def not_at_rest(scenario: Scenario, played: Trajectory) -> Verdict:
     late = played.velocity[-max(1, len(played) // 10) :]
     speed = np.sqrt((late**2).sum(axis=2).mean(axis=1)) / own_speed(scenario)
     event = f"still moves at {speed.max():.3g} sqrt(g R)"
     return read(speed.max(), played.t[-len(late)], event, None)
-
-
-COLLISIONS_MISSED = Predicate(
-    "collisions missed",
-    "a disk passes through a disk or a wall that it should collide with",
-    "collisions",
-    0.0,
-    collisions_missed,
-)
-COLLISIONS_SPURIOUS = Predicate(
-    "spurious collisions",
-    "a disk that touches nothing is deflected",
-    "of the speed",
-    1e-3,
-    collisions_spurious,
-)
-RESTITUTION_OFF = Predicate(
-    "restitution off", "the collision does not have the scene's e", "1", 0.01, restitution_off
-)
-WRONG_DISTANCE = Predicate(
-    "wrong distance",
-    "a free disk has not moved the right distance",
-    "of the way",
-    0.01,
-    wrong_distance,
-)
-VELOCITY_OFF = Predicate(
-    "velocity off",
-    "a disk leaves the collision with a wrong velocity",
-    "of the speed",
-    1e-3,
-    velocity_off,
-)
-SCALED_DEVIATION = Predicate(
-    "deviation",
-    "the path, scaled back, differs from that at scale 1",
-    "radii",
-    0.25,
-    scaled_deviation,
-)
-ANGLE_OFF = Predicate(
-    "angle off",
-    "the angle of a free disk does not follow its spin",
-    "of the angle",
-    0.02,
-    angle_off,
-)
-BOUNCES_OFF = Predicate(
-    "bounce off",
-    "a bounce changes the height that the ball reaches",
-    "of the height",
-    MOST_BOUNCE,
-    bounce_off,
-)
-SPRING_GROWS = Predicate(
-    "spring grows",
-    "the energy of an oscillator doubles or halves",
-    "doublings of energy",
-    1.0,
-    spring_grows,
-)
-FRICTION_OFF = Predicate(
-    "friction off",
-    "the impulse of friction is not that of Coulomb's law",
-    "of the impulse",
-    0.1,
-    friction_off,
-)
-ROLLING_OFF = Predicate(
-    "rolling off",
-    "a disk does not roll at the right speed after it has slid",
-    "of the start speed",
-    0.01,
-    rolling_off,
-)
-SLIPS = Predicate(
-    "slips", "a disk slips on a slope on which it should roll", "of the speed", 0.05, slips
-)
-CREEPS = Predicate(
-    "creeps",
-    "a disk at rest moves or turns after the first tenth of the run",
-    "radii",
-    0.01,
-    creeps,
-)
-STANDS = Predicate(
-    "does not stand",
-    "a disk sinks by 0.1 radii, or jitters at 0.02 sqrt(g R)",
-    "of the bound",
-    1.0,
-    stands,
-)
-EJECTED = Predicate(
-    "ejected", "two disks that start at rest separate at a speed", "radii/s", 0.1, ejected
-)
-STILL_OVERLAP = Predicate(
-    "still overlap", "an overlap is left after a second", "radii", 0.02, still_overlaps
-)
-BURSTS = Predicate(
-    "bursts", "a disk leaves the box, or flies at 10 radii/s", "of the bound", 1.0, bursts
-)
-NOT_AT_REST = Predicate(
-    "not at rest", "a disk that should be at rest moves", "sqrt(g R)", MOST_RESIDUAL, not_at_rest
-)

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from crosscheck2d.reports.compare import laws
 from crosscheck2d.reports.compare.verdicts import MOST_MOMENTUM, Verdict
 from crosscheck2d.reports.stability.predicates import (
-    Predicate,
     first_above,
     largest,
+    predicate,
     read,
     truth_of,
     worst_of,
@@ -24,16 +24,8 @@ from crosscheck2d.scenarios.model import Array, Scenario, Trajectory
 
 # B_k / B_2^(k-1) of hard disks, k = 1 .. 10 (Clisby & McCoy, J. Stat. Phys. 122, 15, 2006).
 VIRIALS = (
-    1,
-    1,
-    (16 / 3 - 4 * np.sqrt(3) / np.pi) / 4,
-    0.53223180,
-    0.33355604,
-    0.1988425,
-    0.1148728,
-    0.0649930,
-    0.0362193,
-    0.0199537,
+    *(1, 1, (16 / 3 - 4 * np.sqrt(3) / np.pi) / 4, 0.53223180, 0.33355604),
+    *(0.1988425, 0.1148728, 0.0649930, 0.0362193, 0.0199537),
 )
 
 
@@ -102,27 +94,34 @@ MOST_OFF = 0.05  # relative to the literature, in addition
 RANGES = 5  # of speed, with equal numbers of disks
 
 
+@predicate("the energy changes at e = 1", "of the energy", 0.01)
 def energy_drifts(scenario: Scenario, played: Trajectory) -> Verdict:
     energy = laws.energy(played, scenario.scene)
     off = np.abs(energy / energy[0] - 1)
     event = f"the energy is {energy[-1] / energy[0]:.4g} times that at the start"
-    return largest(played.t, off, ENERGY_DRIFTS.bound, event, None)
+    return largest(played.t, off, energy_drifts.bound, event, None)
 
 
+@predicate(
+    "the momentum changes by more than a hundred roundings of float32",
+    "of all momenta",
+    MOST_MOMENTUM,
+)
 def momentum_drifts(scenario: Scenario, played: Trajectory) -> Verdict:
     mass, velocity = scenario.scene.mass[:, None], played.velocity
     momentum = (mass * velocity).sum(axis=1)
     whole = laws.lengths(mass * velocity[0]).sum()
     off = laws.lengths(momentum - momentum[0]) / whole
     event = f"the momentum has changed by {off.max():.3g} of the sum of all momenta"
-    return largest(played.t, off, MOMENTUM_DRIFTS.bound, event, None)
+    return largest(played.t, off, momentum_drifts.bound, event, None)
 
 
-def gas_diverges(scenario: Scenario, played: Trajectory) -> Verdict:
+@predicate("the disks of the two runs are at different positions", "radii", 1e-3)
+def diverges(scenario: Scenario, played: Trajectory) -> Verdict:
     off = laws.lengths(played.position - truth_of(scenario).position) / scenario.scene.radius
     disk = int(np.argmax(off[-1]))
     event = f"disk {disk} is at another position"
-    return largest(played.t, off.max(axis=1), GAS_DIVERGES.bound, event, disk)
+    return largest(played.t, off.max(axis=1), diverges.bound, event, disk)
 
 
 def in_blocks(series: Array) -> Array:
@@ -135,6 +134,11 @@ def block_error(blocks: Array) -> float:
     return float(blocks.std(ddof=1)) / sqrt(len(blocks))
 
 
+@predicate(
+    "the temperatures of light and heavy disks differ by half a doubling plus 4 block errors",
+    "doublings",
+    0.5,
+)
 def temperatures_part(scenario: Scenario, played: Trajectory) -> Verdict:
     mass = scenario.scene.mass
     kinetic = mass * (played.velocity**2).sum(axis=2) / 2
@@ -146,22 +150,28 @@ def temperatures_part(scenario: Scenario, played: Trajectory) -> Verdict:
     return read(off, at, event, None)
 
 
+@predicate(
+    "the speeds, collision rate or wall pressure differ from Maxwell, Enskog or the virial series"
+    " by 5 % plus 4 block errors",
+    "of the bound",
+    1.0,
+)
 def wrong_gas(scenario: Scenario, played: Trajectory) -> Verdict:
     collisions, at = played.collisions, float(played.t[len(played) // 10])
     expected, shares = literature(scenario), in_blocks(shares_of_speeds(played))
     words = ("the slowest", *("those between",) * (RANGES - 2), "the fastest")
     parts = [
-        deviation(
+        off_literature(
             "not Maxwell", shares[:, k], 1 / RANGES, f"the share that {word} fifth should be", at
         )
         for k, word in enumerate(words)
     ]
     met = counted(played, collisions.j >= 0, np.ones(len(collisions)))
-    parts.append(deviation("rate", met, expected.rate, "Enskog's rate of collisions", at))
+    parts.append(off_literature("rate", met, expected.rate, "Enskog's rate of collisions", at))
     if not np.isnan(collisions.impulse).any():  # Box2D 3.1 reports no impulses
         force = counted(played, collisions.j < 0, collisions.impulse)
         whose = "the pressure of the virial series"
-        parts.append(deviation("pressure", force, expected.force, whose, at))
+        parts.append(off_literature("pressure", force, expected.force, whose, at))
     return worst_of(parts)
 
 
@@ -179,7 +189,7 @@ def counted(played: Trajectory, which: NDArray[np.bool_], weights: Array) -> Arr
     return sums / np.diff(edges)
 
 
-def deviation(kind: str, blocks: Array, expected: float, whose: str, at: float) -> Verdict:
+def off_literature(kind: str, blocks: Array, expected: float, whose: str, at: float) -> Verdict:
     """The relative error of a mean, less `ERRORS` block errors, in units of `MOST_OFF`."""
     ratio, error = float(blocks.mean()) / expected, block_error(blocks) / expected
     off = max(0.0, abs(ratio - 1) - ERRORS * error) / MOST_OFF
@@ -200,33 +210,3 @@ def shares_of_speeds(played: Trajectory) -> Array:
     bins = np.clip((rank * RANGES).astype(int), 0, RANGES - 1)
     shares: Array = (bins[:, :, None] == np.arange(RANGES)).mean(axis=1)
     return shares
-
-
-ENERGY_DRIFTS = Predicate(
-    "energy drifts", "the energy changes at e = 1", "of the energy", 0.01, energy_drifts
-)
-MOMENTUM_DRIFTS = Predicate(
-    "momentum drifts",
-    "the momentum changes by more than a hundred roundings of float32",
-    "of all momenta",
-    MOST_MOMENTUM,
-    momentum_drifts,
-)
-GAS_DIVERGES = Predicate(
-    "diverges", "the disks of the two runs are at different positions", "radii", 1e-3, gas_diverges
-)
-TEMPERATURES_PART = Predicate(
-    "temperatures part",
-    "the temperatures of light and heavy disks differ by half a doubling plus 4 block errors",
-    "doublings",
-    0.5,
-    temperatures_part,
-)
-WRONG_GAS = Predicate(
-    "wrong gas",
-    "the speeds, collision rate or wall pressure differ from Maxwell, Enskog or the virial series"
-    " by 5 % plus 4 block errors",
-    "of the bound",
-    1.0,
-    wrong_gas,
-)

@@ -4,7 +4,7 @@ replay of its failing run."""
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from contextlib import closing, suppress
+from contextlib import closing
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from math import nan
@@ -17,8 +17,7 @@ from pydantic import TypeAdapter
 from crosscheck2d.adapters.engine_row import EngineRow
 from crosscheck2d.adapters.engines import ENGINES, FETCHED, NAMED, OWN, parsed
 from crosscheck2d.adapters.npm_packages import version_of
-from crosscheck2d.adapters.run import Run
-from crosscheck2d.reports.page.replay import COLLISIONS, pack_layers, ratio_of
+from crosscheck2d.reports.page.replay import COLLISIONS, Layers, pack_layers, ratio_of
 from crosscheck2d.reports.run.cells import about, content_key, source_hash
 from crosscheck2d.reports.run.made import digest_of
 from crosscheck2d.reports.run.playing import STATE
@@ -41,9 +40,12 @@ from crosscheck2d.reports.stability.tables import MAPS, TOUCHING, LawOf, MapOf, 
 from crosscheck2d.reports.terminal.counts import counted
 from crosscheck2d.reports.terminal.progress import Progress
 from crosscheck2d.scenarios.model import Collisions, Scenario, Trajectory, frozen
-from crosscheck2d.scenarios.no_truth import NoTruth
+from crosscheck2d.scenarios.no_truth import answered
 
-SOURCE = ("reports/stability/**/*.py", "reports/compare/**/*.py", "scenarios/**/*.py")
+SOURCE = (
+    *("reports/stability/**/*.py", "reports/stability/*.toml"),
+    *("reports/compare/**/*.py", "scenarios/**/*.py"),
+)
 HEADER = "stability", "plan"  # kind and key of the row with what was asked for
 # s of processor time that a search takes in the quick form, the mean of all engines (1200 searches
 # on one machine): of the cases that take longest, and of the mean of the others
@@ -145,8 +147,8 @@ class StabilityPlan:
         tasks = []
         for name in self.names:
             if name in MAPS or name in TOUCHING:
-                only = MAPS[name].only if name in MAPS else ()
-                engines = [engine for engine in smooth if not only or engine in only]
+                varied = name in MAPS and MAPS[name].play is not None
+                engines = [engine for engine in smooth if not varied or ENGINES[engine].work]
             else:
                 among = engines_of(case_named(name), ENGINES)
                 engines = [engine for engine in among if engine.split("+")[0] in self.engines]
@@ -159,8 +161,9 @@ class StabilityPlan:
         rows = {task: store.get(task.kind, self.key(task)) for task in self.tasks()}
         return {task for task, row in rows.items() if row and row.value["status"] == "ok"}
 
-    def carry_out(self, store: Store, progress: Progress) -> None:
-        keys, done = {task: self.key(task) for task in self.tasks()}, self.done_before(store)
+    def carry_out(self, store: Store, done: Collection[Task], progress: Progress) -> None:
+        """Carry out the tasks that were not done before."""
+        keys = {task: self.key(task) for task in self.tasks()}
         header = about(self.command, 0) | {"versions": self.versions, "form": self.form}
         store.put(*HEADER, header | {"tasks": [(key, task) for task, key in keys.items()]})
         work: dict[Any, Callable[[], Any]] = {
@@ -202,14 +205,10 @@ def with_replay(search: LimitSearch, limit: Limit) -> Limit:
     if failing is None or failure is None or failure[1].trajectory is None:
         return limit
     scenario, run = failure
-    samples, trajectories = near(failing, scenario), [failure[1].trajectory]
-    with suppress(NoTruth):
-        if scenario.truth is not None:
-            trajectories.append(scenario.truth(scenario.times))
-    engine, profile = limit.engine.split(":")
-    runs = Run(engine, profile, limit.case, run.dt), None
-    parts = [part_of(trajectory, samples, scenario) for trajectory in trajectories]
-    layers = [(run, part) for run, part in zip(runs, parts) if len(part)]
+    samples, (_, true) = near(failing, scenario), answered(scenario)
+    layers: Layers = [(run, part_of(failure[1].trajectory, samples, scenario))]
+    if true is not None and len(part := part_of(true, samples, scenario)):
+        layers.append((None, part))
     first, last = (float(scenario.times[k]) for k in (samples[0], samples[-1]))
     at = min(max(failing.at, first), last) if np.isfinite(failing.at) else first
     opening = {

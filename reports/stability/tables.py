@@ -7,7 +7,7 @@ the laws; with gaps the exact answer does.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from itertools import product
@@ -17,47 +17,34 @@ from typing import NamedTuple
 import numpy as np
 
 from crosscheck2d.adapters.engines import ENGINES, changed
-from crosscheck2d.adapters.play import play_once
 from crosscheck2d.adapters.run import Run
-from crosscheck2d.reports.stability.cases_few import LEAD, RADIUS, disks, flyby
+from crosscheck2d.reports.stability.cases import OF_MAPS, PREDICATES
+from crosscheck2d.reports.stability.cases_few import LEAD, RADIUS, flyby
 from crosscheck2d.reports.stability.cases_many import column, gas
-from crosscheck2d.reports.stability.limits import play_as
+from crosscheck2d.reports.stability.limits import DrivenEngine, play_as, played
 from crosscheck2d.reports.stability.predicates import (
     REFUSED,
-    RESTITUTION_OFF,
-    STANDS,
     Predicate,
     judge,
 )
-from crosscheck2d.reports.stability.predicates_gas import ENERGY_DRIFTS
+from crosscheck2d.scenarios.families.placing import lay_out
 from crosscheck2d.scenarios.model import Array, Scenario
 from crosscheck2d.scenarios.truth.exact import with_oracle
 
 
 class Map(NamedTuple):
-    """A question with two parameters.
+    """A question with two parameters."""
 
-    Attributes:
-        asks: the question in one sentence.
-        x_name, y_name, x, y: the parameters with their units, and their values.
-        scene: (x, y, number of the run) -> the scenario.
-        predicate: what is read; the worst of `runs` is shown.
-        only: engines that have the parameter; empty: all.
-        play: (engine, scenario, y) -> the run.
-    """
-
-    asks: str
-    x_name: str
+    asks: str  # in one sentence
+    x_name: str  # with its unit
     y_name: str
-    x: tuple[float, ...]
-    y: tuple[float, ...]
-    scene: Callable[[float, float, int], Scenario]
-    predicate: Predicate
+    x: Sequence[float]
+    y: Sequence[float]
+    scene: Callable[[float, float, int], Scenario]  # of x, y and the number of the run
+    predicate: Predicate  # the worst of its readings is shown
     runs: int = 1
-    only: tuple[str, ...] = ()
-    play: Callable[[str, Scenario, float], Run] = lambda engine, scenario, _y: play_as(
-        engine, scenario
-    )
+    # engine, scenario, y -> the run, where y is a parameter of engines; only those with it play
+    play: Callable[[str, Scenario, float], Run] | None = None
 
 
 @dataclass(frozen=True)
@@ -73,7 +60,8 @@ def map_of(name: str, engine: str) -> MapOf:
     grid, cells = MAPS[name], []
     for x, y in product(grid.x, grid.y):
         scenarios = [grid.scene(x, y, run) for run in range(grid.runs)]
-        verdicts = [judge(grid.predicate, s, grid.play(engine, s, y)) for s in scenarios]
+        runs = [grid.play(engine, s, y) if grid.play else play_as(engine, s) for s in scenarios]
+        verdicts = [judge(grid.predicate, *pair) for pair in zip(scenarios, runs)]
         worst = max((v.value for v in verdicts if isfinite(v.value)), default=nan)
         first = next(((True, v.id, v.text) for v in verdicts if v.failed), (False, "", ""))
         cells.append((x, y, worst, *first))
@@ -84,42 +72,24 @@ def with_iterations(engine: str, scenario: Scenario, count: float) -> Run:
     work = ENGINES[engine].work
     assert work is not None
     make = partial(changed, engine, **{work.setting: int(count)})
-    return play_once(make, engine, scenario, scenario.dt(1))
+    return played(DrivenEngine(engine, make), scenario)
 
 
+# a change of the unit of time alone would give the scene of `flyby`
+MAP_SCENES: dict[str, Callable[[float, float, int], Scenario]] = {
+    "dt_and_speed": lambda x, y, run: flyby(y, run, dt=x / 64),
+    "mass_ratio_and_iterations": lambda x, _y, _run: column(2, [1.0, x]),
+    "packing_and_dt": lambda x, y, run: gas(x, run, steps=100, step=y),
+}
+MAP_PLAYS = {"mass_ratio_and_iterations": with_iterations}
 MAPS = {
-    "dt_and_speed": Map(
-        "Is a head-on collision of disks of 0.25 m at e = 1 elastic, whatever the step and the"
-        " speed?",
-        "dt (1/64 s)",
-        "closing speed (m/s)",
-        (1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0, 2.0, 4.0, 8.0),
-        (0.01, 0.1, 0.5, 2.0, 8.0, 32.0, 128.0, 512.0),
-        # a change of the unit of time alone would give the scene of `flyby`
-        lambda x, y, run: flyby(y, run, dt=x / 64),
-        RESTITUTION_OFF,
-        runs=2,
-    ),
-    "mass_ratio_and_iterations": Map(
-        "How many iterations does a heavy disk need that stands on a light one?",
-        "m2 / m1",
-        "iterations (Box2D 3.1: substeps)",
-        (1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 1e4),
-        (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0),
-        lambda x, _y, _run: column(2, [1.0, x]),
-        STANDS,
-        only=tuple(name for name, row in ENGINES.items() if row.work),
-        play=with_iterations,
-    ),
-    "packing_and_dt": Map(
-        "How much energy does a gas of 36 disks lose or gain in 100 steps?",
-        "packing",
-        "v dt / R",
-        (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.75),
-        (0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0),
-        lambda x, y, run: gas(x, run, steps=100, step=y),
-        ENERGY_DRIFTS,
-    ),
+    name: Map(
+        **{key: value for key, value in row.items() if key != "fails"},
+        scene=MAP_SCENES[name],
+        predicate=PREDICATES[row["fails"]],
+        play=MAP_PLAYS.get(name),
+    )
+    for name, row in OF_MAPS.items()
 }
 
 
@@ -134,22 +104,14 @@ Laws = dict[str, list[Array]]
 
 
 class Touching(NamedTuple):
-    """A scene at e = 1 in which disk 0 strikes disks that touch each other.
+    """A scene at e = 1 in which disk 0 strikes disks that touch each other."""
 
-    Attributes:
-        asks: what happens, in a sentence.
-        position: (n, 2) in radii, all touching; disk 0 comes in along x at speed 1.
-        displaced: (n, 2) by how much a disk is moved for each radius of gap.
-        laws: name -> velocities (n, 2) in units of the incoming speed; several where the order is
-            free.
-        source: of the laws.
-    """
-
-    asks: str
-    position: Array
-    displaced: Array
+    asks: str  # what happens, in a sentence
+    position: Array  # (n, 2) radii, all touching; disk 0 comes in along x at speed 1
+    displaced: Array  # (n, 2) by how much a disk is moved for each radius of gap
+    # name -> velocities (n, 2) in units of the incoming speed; several where the order is free
     laws: Laws
-    source: str
+    source: str  # of the laws
 
 
 class AtGap(NamedTuple):
@@ -204,7 +166,7 @@ def scene_of(touching: Touching, gap: float) -> Scenario:
     after the last collision."""
     position = (touching.position + gap * touching.displaced) * RADIUS
     position[0, 0] -= SPEED * DT * (LEAD + 0.5)
-    scene = disks(position, [[SPEED, 0], *np.zeros((len(position) - 1, 2))])
+    scene = lay_out(position, [[SPEED, 0], *np.zeros((len(position) - 1, 2))])
     crossing = 4 * gap * RADIUS / (SPEED * DT)  # steps: four gaps, or one at a quarter of the speed
     steps = LEAD + 1 + AFTER + ceil(crossing)
     return Scenario("touching", touching.asks, touching.source, scene, steps * DT, DT, (1,))
@@ -230,14 +192,14 @@ def law_of(name: str, engine: str, gaps: tuple[float, ...] = GAPS) -> LawOf:
             results.append(AtGap(gap, REFUSED if run.status == "unsupported" else run.status))
         else:
             velocity = run.trajectory.velocity[-1] / SPEED
-            results.append(named(velocity, gap, answers(name, gap)))
+            results.append(nearest_law(velocity, gap, answers(name, gap)))
     return LawOf(name, engine, tuple(results))
 
 
-def named(velocity: Array, gap: float, laws: Laws) -> AtGap:
-    off = {law: min(np.abs(velocity - v).max() for v in vs) for law, vs in laws.items()}
-    nearest = min(off, key=lambda law: float(off[law]))
+def nearest_law(velocity: Array, gap: float, laws: Laws) -> AtGap:
+    off = {law: min(float(np.abs(velocity - v).max()) for v in vs) for law, vs in laws.items()}
+    law = min(off, key=off.__getitem__)
     momentum = float(np.linalg.norm(velocity.sum(axis=0) - [1, 0]))
     rows = tuple((float(x), float(y)) for x, y in velocity)
-    law = nearest if off[nearest] <= NEAR else "none"
-    return AtGap(gap, law, float(off[nearest]), momentum, float((velocity**2).sum()), rows)
+    name = law if off[law] <= NEAR else "none"
+    return AtGap(gap, name, off[law], momentum, float((velocity**2).sum()), rows)

@@ -25,8 +25,9 @@ from crosscheck2d.reports.compare.causes import (
     by_mechanisms,
     mechanism_words,
 )
+from crosscheck2d.reports.compare.verdicts import Verdict
 from crosscheck2d.reports.stability.cases import CASES
-from crosscheck2d.reports.stability.explain import Ablations, explained, sufficient_mechanisms
+from crosscheck2d.reports.stability.explain import LAWS, ablations, explained, sufficient_mechanisms
 from crosscheck2d.reports.stability.limits import (
     DRIVEN_ENGINES,
     QUICK,
@@ -37,6 +38,7 @@ from crosscheck2d.reports.stability.limits import (
     play_as,
 )
 from crosscheck2d.scenarios.catalogue import scenario
+from crosscheck2d.scenarios.model import Scenario, Trajectory
 from tests.reports.stability.kept_limits import quick_search
 
 
@@ -65,15 +67,15 @@ def test_what_is_known_to_be_the_cause_comes_out_alone(case: str, engine: str, m
 
 
 def test_an_ablation_without_the_cause_does_not_have_the_limit():
-    search, limit = quick_search("slow_collision", "box2d:shipped")
-    ablations = Ablations.of(search, limit)
-    assert ablations is not None
-    others = [mechanism for mechanism in ablations.mechanisms if mechanism.name != RESTITUTION]
+    mechanisms, has_limit = ablations(*quick_search("slow_collision", "box2d:shipped"))
+    others = [mechanism for mechanism in mechanisms if mechanism.name != RESTITUTION]
 
-    assert ablations.alike(ablations.mechanisms)
-    assert not ablations.alike([])
-    assert not ablations.alike(others)
-    assert [mechanism.name for mechanism in ablations.needed()] == [RESTITUTION]
+    assert len(others) == len(mechanisms) - 1
+    assert [has_limit(some) for some in (mechanisms, [], others)] == [True, False, False]
+
+
+def test_the_mechanism_of_a_law_is_one_of_an_engine():
+    assert {law.mechanism for law in LAWS.values()} <= {"", LATE, *NAMES}
 
 
 def test_a_cause_that_no_mechanism_names_gives_no_ablation(monkeypatch: pytest.MonkeyPatch):
@@ -95,13 +97,20 @@ def test_a_cause_that_no_mechanism_names_gives_no_ablation(monkeypatch: pytest.M
 
 def test_where_an_engine_works_nowhere_an_ablation_must_read_as_much_as_it_does():
     search, limit = quick_search("dt_wall_to_wall", "pymunk:shipped")
-    ablations = Ablations.of(search, limit)
-    assert ablations is not None
-    far = replace(ablations, verdict=replace(ablations.verdict, value=3 * ablations.verdict.value))
+    read, factor = search.case.predicate.read, 1.0
 
+    def scaled(judged: Scenario, run: Trajectory) -> Verdict:
+        verdict = read(judged, run)
+        return replace(verdict, value=verdict.value * (factor if run is failing else 1.0))
+
+    failing = search.seen[limit.fails_at][1].trajectory
+    case = replace(search.case, predicate=search.case.predicate._replace(read=scaled))
+    mechanisms, has_limit = ablations(replace(search, case=case), limit)
     assert limit.verdict == "never works"
-    assert ablations.alike(ablations.mechanisms)
-    assert not far.alike(ablations.mechanisms)
+    assert has_limit(mechanisms)
+    factor = 3.0
+    mechanisms, has_limit = ablations(replace(search, case=case), limit)
+    assert not has_limit(mechanisms)
 
 
 @pytest.mark.parametrize("engine", ["reference:ordered", "event_driven:float64"])

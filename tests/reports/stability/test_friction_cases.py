@@ -17,14 +17,12 @@ from crosscheck2d.adapters.mechanisms.table import (
 )
 from crosscheck2d.adapters.play import play
 from crosscheck2d.reports.lessons.lesson import run_of
-from crosscheck2d.reports.stability.cases import CASES
-from crosscheck2d.reports.stability.cases_few import phase
-from crosscheck2d.reports.stability.cases_friction import (
+from crosscheck2d.reports.stability.cases import CASES, FAMILIES
+from crosscheck2d.reports.stability.cases_few import (
     BOUNCE_DT,
     FALL,
-    FRICTION,
-    PHASES,
     in_corner,
+    phase,
     rough_bounce,
 )
 from crosscheck2d.reports.stability.limits import (
@@ -38,6 +36,7 @@ from crosscheck2d.reports.stability.overview import findings
 from crosscheck2d.reports.stability.predicates import judge, truth_of
 from tests.reports.stability.kept_limits import quick_limit
 
+FRICTION = FAMILIES["Friction"]
 MATCHED = ("pymunk:matched", "box2d:matched", "box2d_v3:matched")
 REFUSE = ("reference:exercise", "reference:lesson")
 
@@ -83,7 +82,7 @@ def test_a_contact_that_is_foreseen_for_a_whole_step_takes_less_friction(margin:
     # a gap that one of its four substeps would close, which is a quarter of the phases. The ablated
     # reference does so, too, but not with a margin below the 12.5 mm that a step moves the disk.
     mu, shares, law = 0.1, [], []
-    for run in range(PHASES):
+    for run in range(CASES["friction_in_bounce"].runs):
         scenario = rough_bounce(8.0, run, e=0.5, mu=mu)
         dt, shipped = scenario.dt(1), run_of("box2d_v3:shipped", scenario, 1)
         mechanisms = mechanisms_of(shipped.name, shipped.settings, scenario.scene, dt)

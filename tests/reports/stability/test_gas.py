@@ -22,16 +22,16 @@ from crosscheck2d.reports.stability.predicates import judge
 from crosscheck2d.reports.stability.predicates_gas import (
     BLOCKS,
     ERRORS,
-    MOMENTUM_DRIFTS,
-    TEMPERATURES_PART,
-    WRONG_GAS,
     block_error,
     compressibility,
     counted,
     gas_in_box,
     in_blocks,
     literature,
+    momentum_drifts,
     shares_of_speeds,
+    temperatures_part,
+    wrong_gas,
 )
 from crosscheck2d.scenarios.catalogue import SCENARIOS
 from crosscheck2d.scenarios.model import Scenario, Trajectory, frozen
@@ -105,11 +105,11 @@ def test_an_exact_gas_passes_and_one_that_is_too_hot_does_not():
     # All of it, for two seeds; a gas hotter by a fifth collides more often by a tenth.
     for run in range(2):
         scenario = CASES["thermometer"].scene(0.4, run)
-        assert not judge(WRONG_GAS, scenario, play_as(EXACT, scenario)).failed
+        assert not judge(wrong_gas, scenario, play_as(EXACT, scenario)).failed
     hot = replace(
         scenario, scene=replace(scenario.scene, velocity=scenario.scene.velocity * sqrt(1.2))
     )
-    reading = verdict(WRONG_GAS, scenario, played(EXACT, hot))
+    reading = verdict(wrong_gas, scenario, played(EXACT, hot))
 
     assert reading.failed
     assert reading.id in ("rate", "pressure")
@@ -134,7 +134,7 @@ def test_speeds_that_are_not_maxwells_are_noticed():
     equal = one.velocity / np.linalg.norm(one.velocity, axis=2, keepdims=True)
     speed = np.linalg.norm(one.velocity[0], axis=1)
     alike = replace(one, velocity=frozen(equal * speed.mean()))
-    assert verdict(WRONG_GAS, scenario, alike).id == "not Maxwell"
+    assert verdict(wrong_gas, scenario, alike).id == "not Maxwell"
 
 
 def test_equipartition_holds_in_an_exact_gas_up_to_1e4_and_a_hotter_kind_is_noticed():
@@ -142,10 +142,10 @@ def test_equipartition_holds_in_an_exact_gas_up_to_1e4_and_a_hotter_kind_is_noti
     for ratio in (1.5, 100.0, 1e4):
         scenario = CASES["equipartition"].scene(ratio, 0)
         one = played(EXACT, scenario)
-        assert not verdict(TEMPERATURES_PART, scenario, one).failed
+        assert not verdict(temperatures_part, scenario, one).failed
         heavy = scenario.scene.mass == ratio
         hotter = one.velocity * np.where(heavy, sqrt(2), 1.0)[:, None]
-        assert verdict(TEMPERATURES_PART, scenario, replace(one, velocity=frozen(hotter))).failed
+        assert verdict(temperatures_part, scenario, replace(one, velocity=frozen(hotter))).failed
 
 
 def test_without_walls_momentum_stays_to_rounding_in_every_engine_and_a_leak_is_noticed():
@@ -159,12 +159,12 @@ def test_without_walls_momentum_stays_to_rounding_in_every_engine_and_a_leak_is_
         ("box2d_v3:matched", 1e-6),
     ):
         one = played(engine, scenario)
-        reading = verdict(MOMENTUM_DRIFTS, scenario, one)
+        reading = verdict(momentum_drifts, scenario, one)
         assert not reading.failed
         assert reading.value < bound
         velocity = np.array(one.velocity)
         velocity[-1, 0] = 0.0
-        assert verdict(MOMENTUM_DRIFTS, scenario, replace(one, velocity=frozen(velocity))).failed
+        assert verdict(momentum_drifts, scenario, replace(one, velocity=frozen(velocity))).failed
 
 
 @pytest.mark.slow
@@ -175,8 +175,8 @@ def test_finding_collisions_late_costs_a_dense_gas_its_rate_and_its_pressure():
     scenario, name = CASES["thermometer"].scene(0.6, 0), "pymunk:matched"
     leaving = DrivenEngine(name, lambda: changed(name, elastic_bias=1.0))
     run = limits.played(leaving, scenario)
-    in_order = judge(WRONG_GAS, scenario, play_as("reference:ordered", scenario))
-    late = judge(WRONG_GAS, scenario, run)
+    in_order = judge(wrong_gas, scenario, play_as("reference:ordered", scenario))
+    late = judge(wrong_gas, scenario, run)
     assert run.trajectory is not None
 
     for blocks in as_in_literature(scenario, run.trajectory):

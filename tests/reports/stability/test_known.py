@@ -14,11 +14,14 @@ from crosscheck2d.adapters.engines import changed
 from crosscheck2d.reports.compare import laws
 from crosscheck2d.reports.stability.cases import CASES
 from crosscheck2d.reports.stability.cases_few import ball, far, on_spring, oscillator
+from crosscheck2d.reports.stability.explain import reason_of
 from crosscheck2d.reports.stability.limits import (
     DRIVEN_ENGINES,
     QUICK,
     DrivenEngine,
+    Limit,
     LimitSearch,
+    Trial,
     play_as,
     played,
 )
@@ -29,7 +32,7 @@ from crosscheck2d.reports.stability.tables import (
     TOUCHING,
     answers,
     law_of,
-    named,
+    nearest_law,
 )
 from crosscheck2d.scenarios.model import Trajectory
 from tests.reports.stability.kept_limits import quick_limit
@@ -101,6 +104,19 @@ def test_an_engine_fails_where_a_formula_says(case: str, engine: str, value: flo
     if case.startswith("tunnelling"):  # what is passed through is named
         assert limit.failing is not None
         assert ("wall" in limit.failing.event) == ("wall" in case)
+
+
+def test_what_a_reason_predicts_is_that_formula():
+    compared = 0
+    for row in FAILS_AT:
+        case, engine, value, _ = getattr(row, "values", row)
+        failing = Trial(value, 1, 1, 2.0)
+        limit = Limit(case, engine, "quick", "limit", value, value, (failing,))
+        reason = reason_of(limit)
+        if reason is not None and reason.predicts is not None:
+            assert reason.predicts == pytest.approx(value, rel=1e-6)
+            compared += 1
+    assert compared > 20
 
 
 @pytest.mark.parametrize(("case", "engine"), NEVER_FAILS)
@@ -252,6 +268,6 @@ def test_an_engine_that_keeps_to_no_law_is_not_given_one():
     laws = answers("touching_break", 0.0)
     pairs, at_once = laws[PAIRS][0], laws[AT_ONCE][0]
 
-    assert named(pairs, 0.0, laws).law == PAIRS
-    assert named((pairs + at_once) / 2, 0.0, laws).law == "none"
-    assert named(at_once * 0.95, 0.0, laws).law == "none"
+    assert nearest_law(pairs, 0.0, laws).law == PAIRS
+    assert nearest_law((pairs + at_once) / 2, 0.0, laws).law == "none"
+    assert nearest_law(at_once * 0.95, 0.0, laws).law == "none"

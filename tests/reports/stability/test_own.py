@@ -17,12 +17,19 @@ from crosscheck2d.reports.compare.causes import Cause, CauseKind
 from crosscheck2d.reports.compare.collisions import first_on_line, on_faces, thrown_off
 from crosscheck2d.reports.run.pool import Failure
 from crosscheck2d.reports.stability import explain
-from crosscheck2d.reports.stability.cases import CASES, USABLE, VARIES, case_named, heaviest, varied
+from crosscheck2d.reports.stability.cases import (
+    CASES,
+    VARIES,
+    case_named,
+    heaviest,
+    unusable,
+)
 from crosscheck2d.reports.stability.explain import (
     INTERVENTIONS,
     cause_by_intervention,
     cause_by_settings,
     explained,
+    reason_of,
     with_replays,
 )
 from crosscheck2d.reports.stability.limits import (
@@ -34,7 +41,6 @@ from crosscheck2d.reports.stability.limits import (
     taking_part,
 )
 from crosscheck2d.reports.stability.predicates import judge
-from crosscheck2d.reports.stability.reasons import reason_of
 from crosscheck2d.reports.stability.results import Task
 from crosscheck2d.scenarios.files.scene_file import read_scene_file
 from crosscheck2d.scenarios.truth.exact import with_oracle
@@ -106,7 +112,7 @@ def test_the_answer_of_a_similar_scene_is_the_one_of_the_scene():
     # Against the oracle's own, where it can follow both: they differ by the last places of the
     # scene's numbers.
     for what, x in (("scale", 2.0), ("offset", 3.0)):
-        scenario = varied(str(SCENES / "two.toml"), what, x, 0)
+        scenario = case_named(f"{SCENES / 'two.toml'}:{what}").scene(x, 0)
         own = with_oracle(scenario).truth
         assert scenario.truth is not None
         assert own is not None
@@ -214,7 +220,7 @@ def test_a_floor_of_pieces_is_one_contact_for_right_engines(engine: str):
         assert run.trajectory is not None
         assert len(run.trajectory.collisions) > 5
         assert len(on_faces(run.trajectory, scenario.scene)) == 1
-        assert not judge(USABLE, scenario, run).failed
+        assert not judge(unusable, scenario, run).failed
 
 
 @pytest.mark.parametrize("engine", GHOSTS)
@@ -229,7 +235,7 @@ def test_a_ghost_collision_is_named_and_gone_on_one_wall(engine: str):
     assert share > 1
     assert (disk, wall) == (0, 0)
     assert np.isfinite(at)
-    reading = judge(USABLE, scenario, run)
+    reading = judge(unusable, scenario, run)
     assert reading.id == "ghost collision"
     assert "where two of its walls meet" in reading.text
 

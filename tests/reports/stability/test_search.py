@@ -109,22 +109,22 @@ def test_what_is_counted_is_bracketed_by_neighbours():
     assert (found.works_at, found.fails_at) == (17, 18)
 
 
-def test_a_limit_that_is_not_met_is_a_result():
-    never_fails, never_works = (limit_of(case(lambda _x, _run, y=y: y, UP)) for y in (0.5, 2.0))
+@pytest.mark.parametrize(
+    ("reading", "verdict", "works", "fails"),
+    [
+        (lambda _: 0.5, "does not fail", (100, 100), None),
+        (lambda _: 2.0, "never works", None, (1, 1)),
+        (lambda x: 17 / x, "works only beyond", (17, 30), (10, 17)),
+    ],
+)
+def test_where_no_stretch_of_values_works_before_a_failure_the_verdict_says_so(
+    reading, verdict, works, fails
+):
+    limit = limit_of(case(lambda x, _: reading(x), UP))
 
-    assert never_fails.verdict == "does not fail"
-    assert never_fails.works_at == 100
-    assert isnan(never_fails.fails_at)
-    assert never_works.verdict == "never works"
-    assert never_works.fails_at == 1
-    assert isnan(never_works.works_at)
-
-
-def test_what_works_only_where_it_is_harsh_is_called_so():
-    found = limit_of(case(lambda x, _: 17 / x, UP))
-
-    assert found.verdict == "works only beyond"
-    assert found.fails_at <= 17 <= found.works_at
+    assert limit.verdict == verdict
+    for value, span in ((limit.works_at, works), (limit.fails_at, fails)):
+        assert isnan(value) if span is None else span[0] <= value <= span[1]
 
 
 def test_a_few_values_that_work_beyond_more_that_fail_are_no_limit():
