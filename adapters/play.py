@@ -16,16 +16,13 @@ Watch = Callable[[State], None]  # called with every valid sample
 
 
 def unwatched(state: State) -> None:
-    """The default `Watch`: do nothing."""
+    pass
 
 
 def play_once(
     make: Callable[[], Engine], name: str, scenario: Scenario, dt: float, watch: Watch = unwatched
 ) -> Run:
-    """Run `play` on a new engine from `make`, which is always closed at the end.
-
-    If its library cannot be imported, the run is `unsupported`. Raises what `play` raises.
-    """
+    """`play` on a new engine, closed at the end; without its library the run is `unsupported`."""
     try:
         engine = make()
     except ImportError as missing:

@@ -62,7 +62,6 @@ class Scene:
 
     @property
     def n(self) -> int:
-        """Number of disks."""
         return len(self.radius)
 
     @property
@@ -72,7 +71,6 @@ class Scene:
 
     @property
     def state(self) -> State:
-        """The initial state."""
         return State(self.position, self.velocity, self.angle, self.angular_velocity)
 
 
@@ -138,8 +136,6 @@ class Scenario:
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """Position and velocity of every disk at one instant."""
-
     position: Array  # (n, 2) m
     velocity: Array  # (n, 2) m/s
     angle: Array  # (n,) rad
@@ -157,7 +153,7 @@ class Collisions:
 
     @staticmethod
     def of(rows: Sequence[tuple[float, int, int, float]]) -> Collisions:
-        """Collisions from (t, i, j, impulse) rows in any order, a pair's disks too."""
+        # from (t, i, j, impulse) in any order, a pair's disks too
         ordered = sorted((t, i, j, J) if j < 0 or i < j else (t, j, i, J) for t, i, j, J in rows)
         t, i, j, impulse = zip(*ordered) if ordered else ((), (), (), ())
         return Collisions(frozen(t), frozen(i, np.int64), frozen(j, np.int64), frozen(impulse))
@@ -189,5 +185,4 @@ class Trajectory:
         return len(self.t)
 
     def at(self, k: int) -> State:
-        """The state at sample `k`."""
         return State(self.position[k], self.velocity[k], self.angle[k], self.angular_velocity[k])

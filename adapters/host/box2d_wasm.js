@@ -7,7 +7,7 @@
     turning: true, substeps: 4, hertz: 30, damping_ratio: 10, push_speed: 3, continuous: true, bullet: false,
   };
   const shipped = { ...common, matched: false, sleeping: true, fast_rotation: false };
-  // As box2d_v3:matched, and without a cap on spins: "this should only be used for circular objects, like wheels"
+  // Matched as Box2D 3.1 is, and without a cap on spins: "this should only be used for circular objects, like wheels"
   // (b2BodyDef::allowFastRotation).
   const matched = {
     ...common, matched: true, sleeping: false, fast_rotation: true, length_unit: 0.3, hertz: 120, damping_ratio: 1,

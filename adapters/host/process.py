@@ -334,7 +334,7 @@ Call = Annotated[list[Verb | Place | Number], AfterValidator(must_be_a_call)]
 Setting = StrictStr | StrictBool | StrictInt | StrictFloat | None
 
 
-class Failure(TypedDict):
+class FailureForm(TypedDict):
     # unavailable: it imports what is not there, or what a guest may not; waited: ended by the
     # clock, before it had its processor time
     kind: Literal[
@@ -359,18 +359,18 @@ class Answer(TypedDict):
     strange: list[StrictStr]
     kept: list[StrictStr]
     calls: list[Call]
-    error: Failure | None
+    error: FailureForm | None
 
 
 class Readings(TypedDict):
     readings: Count
     seconds: Number
     numbers: StrictStr
-    thrown: Failure | None
+    thrown: FailureForm | None
 
 
 PLAYS = ("play", "ahead", "samples")
-FAILURE, HELLO = TypeAdapter(Failure), TypeAdapter(Hello)
+FAILURE, HELLO = TypeAdapter(FailureForm), TypeAdapter(Hello)
 FORMS: dict[str, TypeAdapter[Any]] = {
     "ask": TypeAdapter(Answer),
     "accesses": TypeAdapter(list[tuple[Literal["r", "w"], Place, StrictStr, list[Count]]]),
@@ -399,7 +399,7 @@ def value_of(command: str, answer: Any) -> Any:
     return done
 
 
-def failure_in(failed: Failure | None) -> SolverFailed | None:
+def failure_in(failed: FailureForm | None) -> SolverFailed | None:
     if failed is None:
         return None
     what = with_hint(failed["what"])

@@ -1,9 +1,6 @@
-"""Compare the runs of one scenario with the truth and with each other, in one tidy table,
-deviations.csv: a row for each number, with its run and what it is measured against.
-
-A verdict fails above its bound, other numbers have none. A value is NaN only where it is not
-judged, and in the row of a run without numbers; the note says why.
-"""
+"""The runs of one scenario beside the truth and each other, in one tidy table, deviations.csv: a
+row for each number. A verdict fails above its bound; other numbers have none. A value is NaN only
+where it is not judged, and in the row of a run without numbers; the note says why."""
 
 from __future__ import annotations
 
@@ -71,7 +68,6 @@ def compare(scenario: Scenario, runs: Sequence[Run]) -> Comparison:
 
 
 def _measure(run: Run, view: View, versus: str) -> list[TableRow]:
-    """A row for each metric that applies."""
     kind, rows = versus if versus in (ITSELF, TRUTH) else ENGINE, []
     with np.errstate(over="ignore", invalid="ignore"):  # a disk thrown far out gives inf or nan
         for name, metric in METRICS.items():
@@ -99,7 +95,6 @@ def verdict_row(run: Run, verdict: Verdict) -> TableRow:
 
 
 def status_row(run: Run, reason: str, versus: str = ITSELF) -> TableRow:
-    """The row of a run without numbers, with the reason."""
     return table_row(run, "status", Value(np.nan, note=reason, judged=False), "", versus)
 
 

@@ -19,7 +19,7 @@ WAIT = 6
 NEVER = 2**31  # a frame that no flight has
 
 
-class Event(NamedTuple):
+class FlightEvent(NamedTuple):
     """What happened in a frame at (x, y) m.
 
     disks: the two that collided for the first time in that frame (wall w as -1 - w); the one whose
@@ -38,7 +38,7 @@ class Divergence(NamedTuple):
     """Where a ghost diverged from the engine that was solid then, and what happened there; `only`:
     the engine in which alone it happened, "" in both."""
 
-    at: Event
+    at: FlightEvent
     solid: str
     only: str
 
@@ -55,7 +55,7 @@ class Touches:
     def __init__(self, scene: Scene, dt: float, weight: float) -> None:
         self.radius, self.dt, self.weight, self.count = scene.radius, dt, weight, 0
         self.since = 0.0  # s on the flight's clock from which the engine counts its steps
-        self.recent: list[Event] = []
+        self.recent: list[FlightEvent] = []
         # by pair: step of the latest impulse, and size of the strongest
         self.step: dict[tuple[int, int], int] = {}
         self.strongest: dict[tuple[int, int], float] = {}
@@ -80,7 +80,7 @@ class Touches:
                 share = self.radius[i] / (self.radius[i] + self.radius[j]) if j >= 0 else 0.0
                 place = position[i] + share * (position[max(j, 0)] - position[i])
                 x, y = place.tolist()
-                self.recent.append(Event(frame, x, y, (i, j), t))
+                self.recent.append(FlightEvent(frame, x, y, (i, j), t))
                 struck |= {i, j}
 
     def begins(self, collision: ContactImpulse) -> bool:
@@ -115,7 +115,7 @@ def differing_since(since: Array, velocity: Array, other: Array, frame: int) -> 
 
 def cause_of(
     since: Array, solid: Touches, ghost: Touches, state: State, frame: int
-) -> tuple[Event, bool, bool] | None:
+) -> tuple[FlightEvent, bool, bool] | None:
     """What made a disk differ that has done so for `WAIT` frames by the end of frame `frame`, and
     whether it happened in the solid engine and in the ghost; None if no disk has. `state`: the
     ghost's."""
@@ -128,7 +128,7 @@ def cause_of(
     if not touches:
         disk = min(disks)
         x, y = state.position[disk].tolist()
-        return Event(first, x, y, (disk,)), True, True
+        return FlightEvent(first, x, y, (disk,)), True, True
     # both its disks, if others of them met a right one in the same frame
     at = min(
         touches, key=lambda touch: (any(k >= 0 and k not in disks for k in touch.disks), touch.t)

@@ -22,7 +22,7 @@ from crosscheck2d.reports.game.divergence import (
     NEVER,
     WAIT,
     Divergence,
-    Event,
+    FlightEvent,
     Touches,
     cause_of,
     differing_since,
@@ -132,7 +132,7 @@ class Flyer:
     differs: Array
     left: str = ""
     left_at: float = 0.0
-    edges: list[Event] = field(default_factory=list)
+    edges: list[FlightEvent] = field(default_factory=list)
     beside: bool = False
     seen: int = 0
     divergence: Divergence | None = None
@@ -308,7 +308,7 @@ class Flight:
             array[SHIP] = getattr(scene, name)[SHIP]
         arrays["position"][SHIP] = free_place(scene, arrays["position"])
         flyer.beside = bool((arrays["position"][SHIP] != scene.position[SHIP]).any())
-        flyer.edges.append(Event(self.frame, *before.position[SHIP].tolist()))
+        flyer.edges.append(FlightEvent(self.frame, *before.position[SHIP].tolist()))
         flyer.touches.begin_again(SHIP, now)
         flyer.seen = 0
         try:

@@ -47,18 +47,18 @@ VERDICTS = {
     "failed": "unknown: failed",
 }
 TEXT: dict[str, dict[str, Any]] = tomllib.loads(
-    Path(__file__).with_name("page.toml").read_text("utf-8")
+    Path(__file__).with_name("page.toml").read_text(encoding="utf-8")
 )
 
 
-class Numbers(Formatter):
+class NumberFormatter(Formatter):
     """Fills `{name:digits}` in with a number of so many digits, of three without."""
 
     def format_field(self, value: Any, format_spec: str) -> str:
         return value if isinstance(value, str) else number(value, int(format_spec or 3))
 
 
-FORMAT = Numbers()
+FORMAT = NumberFormatter()
 
 
 def text(key: str, part: str, **values: Any) -> str:

@@ -24,7 +24,7 @@ from crosscheck2d.adapters.run import first_collisions
 from crosscheck2d.reports.game.divergence import (
     NEVER,
     WAIT,
-    Event,
+    FlightEvent,
     Touches,
     cause_of,
     differing_since,
@@ -500,7 +500,7 @@ def test_a_velocity_that_differs_without_a_collision_is_said_to():
     flight.advance(WAIT)
 
     assert slow.divergence is not None
-    assert slow.divergence.at == Event(40, *slow.state.position[SHIP], (SHIP,))
+    assert slow.divergence.at == FlightEvent(40, *slow.state.position[SHIP], (SHIP,))
 
 
 @pytest.mark.parametrize("name", ["reference:exercise", "event_driven:float64", "pymunk:matched"])
