@@ -84,7 +84,7 @@ FORBIDDEN: dict[str, str] = {
     "write numpy's folder": (
         "import numpy; open(os.path.dirname(numpy.__file__) + '/x.py', 'w'); return True"
     ),
-    "write the driver": "open(sys.argv[0], 'a').write('#'); return True",
+    "write the driver": "open(sys.modules['driver'].__file__, 'a').write('#'); return True",
     "write /var/tmp": "open('/var/tmp/crosscheck-attack', 'w'); return True",
     "write /dev/shm": "open('/dev/shm/crosscheck-attack', 'w'); return True",
     "chmod of others": "os.chmod(SECRET, 0o777); return True",

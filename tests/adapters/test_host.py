@@ -139,7 +139,7 @@ def state() -> tuple[object, ...]:
 def running() -> set[int]:
     found = set()
     for process in psutil.process_iter(["cmdline", "ppid"]):
-        if "/host/driver.py" in (process.info["cmdline"] or ()):
+        if any("import driver" in word for word in process.info["cmdline"] or ()):
             with suppress(psutil.NoSuchProcess):  # it ends meanwhile
                 above = {parent.pid for parent in process.parents()}
                 if os.getpid() in above or process.info["ppid"] == 1:

@@ -253,7 +253,7 @@ def is_forked(process: psutil.Process) -> bool:
         return (
             parent is not None
             and "python" in process.name()
-            and "driver.py" in " ".join(process.cmdline())
+            and "import driver" in " ".join(process.cmdline())
             and parent.cmdline() == process.cmdline()
         )
     return False

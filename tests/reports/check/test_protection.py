@@ -145,7 +145,7 @@ def test_a_hostile_hand_in_earns_nothing_and_harms_nobody(tmp_path: Path):
         for p in psutil.process_iter(["cmdline", "ppid"])
         if p.info["ppid"] == 1
     ]
-    assert not [words for words in commands if "/host/driver.py" in words]
+    assert not [words for words in commands if any("import driver" in word for word in words)]
 
 
 def recorded() -> str:

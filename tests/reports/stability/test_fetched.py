@@ -51,10 +51,15 @@ def test_a_report_of_a_package_names_its_version_and_no_file():
 FAST = ("tunnelling_head_on", "slow_collision", "far_from_origin")
 
 
+# Rapier takes most of the time, two minutes: for the long run.
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "row",
-    [row for row in kept(FILE_OF_FETCHED) if row.case in FAST],
+    [
+        pytest.param(row, marks=[pytest.mark.long] if row.engine.startswith("rapier2d") else [])
+        for row in kept(FILE_OF_FETCHED)
+        if row.case in FAST
+    ],
     ids=lambda row: f"{row.case}-{row.engine}",
 )
 def test_the_quick_form_finds_the_kept_limit_of_the_full_one(row: Kept):
