@@ -33,6 +33,7 @@ from crosscheck2d.adapters.pymunk import Pymunk
 from crosscheck2d.adapters.reference import Reference
 from crosscheck2d.reference_impl import exercise, neighbours, ordered
 from crosscheck2d.reports.run.cells import about, busy_cores
+from crosscheck2d.scenarios.catalogue import scenario
 from crosscheck2d.scenarios.model import Scene
 from tests.adapters.event_driven.gases import boxed_asteroids, boxed_gas
 from tests.bench.events import alone
@@ -252,6 +253,17 @@ def in_order() -> Iterator[Figure]:
         yield Figure(scene, 21, "largest error", max(errors), unit="m", at_most=1e-6)
 
 
+def without_edges() -> Iterator[Figure]:
+    """The 21 disks of the exercise without the edges of their torus, which no library has."""
+    scene, dt = replace(scenario("asteroids").scene, wrap=None), 1 / 60
+    for variant, least in ((neighbours, 14.0), (exercise, 3.0)):
+        steps = {
+            f"reference:{variant.__name__.rpartition('.')[2]}": reference(variant, scene, dt),
+            "pymunk:matched": pymunk("matched", scene, dt),
+        }
+        yield from compared("asteroids without edges", 21, steps, {"pymunk": least})
+
+
 def main() -> None:
     header = about("python -m tests.bench.reference", 0)
     lines = {"started": header["started"], **header["machine"], **header["versions"]}
@@ -260,7 +272,7 @@ def main() -> None:
         file.writelines(f"# {key}: {value}\n" for key, value in lines.items())
         table = csv.writer(file, lineterminator="\n")
         table.writerow(Figure._fields)
-        for part in (gases, small, sizes, in_order):
+        for part in (gases, small, sizes, in_order, without_edges):
             for figure in part():
                 row = [
                     "" if cell is None else f"{cell:.4g}" if isinstance(cell, float) else cell
