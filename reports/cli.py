@@ -301,7 +301,9 @@ def check(
 
         write_scaffold(scaffold, path, points, hints)
         return
-    folder = outs.pop() if outs and len(outs) == 1 and not formats and path.is_dir() else None
+    kept = path.is_dir() and not formats and len(outs or []) == 1
+    # a file, such as marks.csv, of which --format has to say what it holds
+    folder = outs.pop() if kept and outs and not outs[0].suffix else None
     outputs = outputs_of(as_json, junit, formats or [], outs or [])
     asking = Asking(seed, packages or (), unprotected, folder, fresh)
     check_and_say(path, page, outputs, grading, asking)

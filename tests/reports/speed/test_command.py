@@ -134,12 +134,13 @@ def test_bad_input_is_one_clear_sentence(words: str, says: str):
 def test_a_scene_without_an_exact_answer_is_refused_by_name(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    monkeypatch.setattr("crosscheck2d.reports.speed.ladder.reason_of", lambda *_: "two outcomes")
+    # what is sent to a worker has to be found there by its name
+    monkeypatch.setattr("crosscheck2d.reports.speed.ladder.reason_of", "{} has two outcomes".format)
     done = crosscheck("speed", "cradle_touching", "--out", "out", cwd=tmp_path)
 
     assert done.returncode == 1
     assert "cradle_touching" in done.stderr
-    assert "no exact answer: two outcomes" in done.stderr
+    assert "no exact answer: cradle_touching has two outcomes" in done.stderr
     files = {path.name for path in (tmp_path / "out").iterdir()}
     assert files == {".crosscheck.lock", "results.sqlite"}
 
