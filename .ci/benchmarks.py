@@ -42,7 +42,6 @@ def check() -> list[str]:
     print(
         f"the cost of a step against reference:exercise, the fastest of {ROUNDS} rounds", flush=True
     )
-    # what friction costs where there is none has a benchmark of its own: tests/bench/friction.py
     engines = {name: row.make for name, row in ENGINES.items() if not row.adds_friction}
     samples, _, _ = sizes.costs(engines, figures.GATED, ROUNDS, BUDGET, PATIENCE, seed=0)
     rows = [

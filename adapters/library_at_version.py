@@ -171,7 +171,7 @@ class LibraryAtVersion(NamedTuple):
 def script_of(file: Path) -> str:
     """What V8 plays of a package: an ES module becomes a script that sets `module.exports`; the
     WebAssembly beside it is a field `wasm` of that, in base64."""
-    text = file.read_bytes().decode()
+    text = file.read_bytes().decode(errors="replace")  # a damaged file has another hash
     if file.suffix == ".mjs":
         text = text.replace("import.meta.url", '""').replace("export default", "module.exports =")
     wasm = file.with_suffix(".wasm")

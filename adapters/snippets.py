@@ -250,7 +250,7 @@ TEMPLATES = {
 
 def write_snippet(name: str, scene: Scene, dt: float) -> str:
     """Code that makes a world of the library of `engine:profile` with the settings that the adapter
-    has for the scene at steps of `dt` s; "" for an engine that is no library."""
+    has for the scene at steps of `dt` s; "" for an engine that is no library, and box2d_wasm."""
     library, _, profile = name.partition(":")
     if library not in TEMPLATES:
         return ""

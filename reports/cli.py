@@ -6,6 +6,7 @@ from __future__ import annotations
 import shlex
 import sys
 from functools import partial
+from os.path import isdir  # unlike that of a path, it takes names that no file can have
 from pathlib import Path
 from typing import Annotated
 
@@ -246,8 +247,8 @@ def check(
         None,
         "--out",
         help="Where the --format goes.  [default: printed]  Without a --format, of a class: the"
-        " folder for its marks and its page. What was checked there before is not checked"
-        " again.",
+        " folder (a name without a dot) for its marks and its page. What was checked there"
+        " before is not checked again.",
     ),
     fresh: Fresh = False,
     points: Path | None = path_option(
@@ -301,9 +302,11 @@ def check(
 
         write_scaffold(scaffold, path, points, hints)
         return
-    kept = path.is_dir() and not formats and len(outs or []) == 1
-    # a file, such as marks.csv, of which --format has to say what it holds
-    folder = outs.pop() if kept and outs and not outs[0].suffix else None
+    # a name with a suffix is a file, such as marks.csv, of which --format has to say what it holds
+    keeps = outs and len(outs) == 1 and not formats and not outs[0].suffix and isdir(path)
+    folder = outs.pop() if keeps and outs else None
+    if fresh and folder is None:
+        refuse("--fresh: is for the results of a class that --out FOLDER keeps")
     outputs = outputs_of(as_json, junit, formats or [], outs or [])
     asking = Asking(seed, packages or (), unprotected, folder, fresh)
     check_and_say(path, page, outputs, grading, asking)

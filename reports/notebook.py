@@ -118,7 +118,12 @@ def run(
         timeout: s that a run may take. A failed run is a row with its reason.
     """
     several = [scenes] if isinstance(scenes, SceneLike) else scenes
-    steps = [float(dt) for dt in np.atleast_1d(np.asarray(dts, float))]
+    steps = list(np.atleast_1d(dts))
+    if not several:
+        raise ValueError("scenes=[]: name at least one")
+    for dt in steps:
+        if not isinstance(dt, (int, float, np.number)) or not dt > 0:
+            raise ValueError(f"dts={dts!r}: each must be a number of s, more than 0")
     scenarios = [with_steps(scene(each, seed), steps, False) for each in several]
     with raising():
         names = checked_engines([engines] if isinstance(engines, str) else engines or of_main_job())
@@ -145,7 +150,10 @@ def run(
 
 
 def check(path: str | Path) -> pd.DataFrame:
-    """Check a solver of the exercise, Exercise.js or solver.py: a row for each question."""
+    """Check a solver of the exercise, Exercise.js or solver.py: a row for each question. A class
+    needs `crosscheck check FOLDER`."""
+    if Path(path).is_dir():
+        raise ValueError(f"{path}: is a folder; for a class: crosscheck check {path}")
     found = check_file(Path(path))
     if found.refused:
         raise ValueError(found.refused)
@@ -162,9 +170,10 @@ def advise(
 ) -> pd.DataFrame:
     """The engines and coarsest step sizes that keep an error in a scene, cheapest first; then those
     not advised, with the reason. Raises `ValueError` for a scene without an exact answer."""
-    if purpose not in PURPOSES or not error > 0:
-        allowed = f"purpose must be one of {', '.join(PURPOSES)}, error more than 0"
-        raise ValueError(f"purpose={purpose!r}, error={error!r}: {allowed}")
+    if purpose not in PURPOSES:
+        raise ValueError(f"purpose={purpose!r}: must be one of {', '.join(PURPOSES)}")
+    if not isinstance(error, (int, float)) or not error > 0:
+        raise ValueError(f"error={error!r}: must be a number more than 0, such as 0.01 for 1 %")
     scenario = scene(of, seed)
     with raising():
         names = checked_engines([engines] if isinstance(engines, str) else engines, ENGINES)

@@ -214,7 +214,7 @@ class GuestEngine:
 
 
 class PackageEngine(GuestEngine):
-    """planck, matter or Rapier: `NAME.js` of this folder, which drives an npm package.
+    """planck, matter, Rapier or Box2D: `NAME.js` of this folder, which drives an npm package.
 
     Its file says what the profiles choose; `changed` are keys of that choice, or friction;
     `library` is another version than the pinned one. The driver does the wrap, and its time is in

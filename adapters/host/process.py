@@ -323,9 +323,14 @@ Sphere = Annotated[list[Number], Field(min_length=12, max_length=12)]
 Contact = Annotated[list[Number], Field(min_length=19, max_length=19)]
 
 
+SPHERES = {"integrate": 1, "collide": 2}  # that a call is given
+
+
 def must_be_a_call(call: list[Any]) -> list[Any]:
     if [k for k, item in enumerate(call) if type(item) is str] != [0]:
         raise ValueError("a call is the name of its function, then numbers")
+    if len(call) <= SPHERES.get(call[0], 0):
+        raise ValueError("a call lacks a sphere")
     return call
 
 
@@ -388,9 +393,10 @@ def value_of(command: str, answer: Any) -> Any:
     `TypeError` or `KeyError` for another form."""
     if "failed" in answer:
         return failure_in(FAILURE.validate_python(answer["failed"]))
+    done = answer["done"]
     if command not in FORMS:
         return None
-    done = FORMS[command].validate_python(answer["done"])
+    done = FORMS[command].validate_python(done)
     if command == "ask":
         return done | {"error": failure_in(done["error"])}
     if command in PLAYS:

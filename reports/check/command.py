@@ -124,6 +124,10 @@ def check(
         check_into(None, path, page, outputs, grading, asking)
     if asking.folder.resolve().is_relative_to(path.resolve()):
         refuse(f"--out {asking.folder}: is in the class; name a folder elsewhere")
+    written = {"--page": page} | {one.option: one.path for one in outputs}
+    for option, file in written.items():
+        if file is not None and file.resolve().is_relative_to(asking.folder.resolve()):
+            refuse(f"{option} {file}: is in the folder of --out; name a place elsewhere")
     files_of(path)  # which refuses what is no class, before a folder is made
     with opening(asking.folder, COMMAND, asking.fresh) as store, keeping(store.folder, kept):
         check_into(store, path, page, outputs, grading, asking)
@@ -473,10 +477,9 @@ def checked(
             if row := store.get("check", key):
                 done[file] = from_row(row.value, file, homes.get(file))
     missing = [file for file in firsts if file not in done]
-    kept = store, keys
-    done |= ask_all(missing, os.cpu_count() or 1, seed, packages, homes, *kept)
+    done |= ask_all(missing, os.cpu_count() or 1, seed, packages, homes, store, keys)
     if late := [file for file in firsts if done[file].waited]:
-        done |= ask_all(late, 1, seed, packages, homes, *kept)
+        done |= ask_all(late, 1, seed, packages, homes, store, keys)
     for first, *others in alike.values():
         done |= {file: named_for(file, done[first], homes.get(file)) for file in others}
     if len(files) > 1:

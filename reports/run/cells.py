@@ -28,7 +28,7 @@ SOURCES = (
     *("scenarios/model.py", "reports/run/playing.py", "reports/run/known_answers.py"),
 )
 JUDGE_SOURCE = ("reports/compare/**/*.py", "reports/run/comparing.py", "scenarios/**/*.py")
-CHECK_SOURCE = ("reports/check/**/*.py", "reports/check/**/*.toml")
+CHECK_SOURCE = ("reports/check/**/*.py", "reports/check/**/*.toml", "scenarios/**/*.py")
 ROOT = Path(__file__).parents[2]
 # besides the distributions of the engines
 DECIDING = ("mini-racer", "numba", "numpy", "crosscheck2d")

@@ -432,7 +432,7 @@ class Results:
             asked for.
         points: as of `points`; and idle, what as many steps cost where there is nothing to do, µs
             per simulated s.
-        pooled: see `pooling.pooled`; of scenes without friction, as is `pooled_reached`, unless
+        pooled: see `accuracy.pooled`; of scenes without friction, as is `pooled_reached`, unless
             every scene has friction.
         versus, models, explained: see `against_own`, `cheapest_models`, `budget.explain`.
     """

@@ -85,6 +85,7 @@ FORBIDDEN: dict[str, str] = {
         "import numpy; open(os.path.dirname(numpy.__file__) + '/x.py', 'w'); return True"
     ),
     "write the driver": "open(sys.modules['driver'].__file__, 'a').write('#'); return True",
+    "write its bytecode": "open(sys.modules['driver'].__cached__, 'ab').write(b'#'); return True",
     "write /var/tmp": "open('/var/tmp/crosscheck-attack', 'w'); return True",
     "write /dev/shm": "open('/dev/shm/crosscheck-attack', 'w'); return True",
     "chmod of others": "os.chmod(SECRET, 0o777); return True",

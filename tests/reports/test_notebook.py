@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import nbformat
@@ -126,7 +127,7 @@ def test_advice_names_the_cheapest_first():
     assert advice.engine.tolist() == ["event_driven:float64"]
     assert advice.error[0] < 1e-9
     assert advice.us_per_simulated_s[0] > 0
-    with pytest.raises(ValueError, match="purpose must be one of trajectory"):
+    with pytest.raises(ValueError, match="must be one of trajectory"):
         crosscheck2d.advise("free_fall", purpose="fun")
     with pytest.raises(ValueError, match="no exact answer"):
         crosscheck2d.advise(crosscheck2d.scene(**THREE))
@@ -161,3 +162,16 @@ def test_the_notebook_runs_and_every_cell_shows_something():
 
     assert all(any("text/html" in data for data in outputs) for outputs in shown)
     assert ["<iframe" in str(outputs) for outputs in shown] == [True, True, True, False, False]
+
+
+def test_bad_arguments_are_one_sentence():
+    scene = crosscheck2d.scene("head_on_equal_e09")
+    calls: dict[str, Callable[[], object]] = {
+        r"scenes=\[\]: name at least one": lambda: crosscheck2d.run([], ["pymunk"]),
+        "must be a number of s": lambda: crosscheck2d.run(scene, "pymunk", dts=[0]),
+        "such as 0.01 for 1 %": lambda: crosscheck2d.advise(scene, error="1%"),  # type: ignore[arg-type]
+        "is a folder; for a class": lambda: crosscheck2d.check(Path()),
+    }
+    for says, call in calls.items():
+        with pytest.raises(ValueError, match=says):
+            call()

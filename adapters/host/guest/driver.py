@@ -446,7 +446,9 @@ class EngineWorld:
         value = value.tolist() if hasattr(value, "tolist") else value
         try:
             numbers = self.np.array(value)
-        except (TypeError, ValueError):
+            if numbers.dtype.kind == "O":  # such as fractions, or ints of more than 64 bits
+                numbers = numbers.astype(float)
+        except (TypeError, ValueError, OverflowError):
             raise wrong("read", value, wanted, f" as {name}") from None
         if numbers.dtype.kind not in "iuf" or numbers.shape != shape:
             if self.guest.loads > 1 and numbers.ndim and len(numbers) > self.n:

@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
 from unittest import mock
@@ -39,6 +40,7 @@ from tests.reports.run.control_engines import (
     Controlled,
     Remembers,
     hangs,
+    is_killed_once,
     loads_slowly,
     row,
 )
@@ -156,6 +158,26 @@ def impatient(*words: Any) -> CellResult:
     return play_here(*words)
 
 
+def test_a_worker_that_is_killed_from_outside_is_no_fault_of_its_cell(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setenv("CONTROL_MARK", str(tmp_path / "mark"))
+    results = dict(
+        run_all(
+            cells(
+                {
+                    "once:control": row(partial(Controlled, is_killed_once)),
+                    "good:control": row(Controlled),
+                }
+            ),
+            workers=1,
+        )
+    )
+
+    assert (tmp_path / "mark").exists()
+    assert results["once:control"].file == results["good:control"].file
+
+
 def test_an_engine_that_leaves_state_gets_a_process_a_cell():
     tasks = cells(
         {f"{kind}{i}:control": row(Remembers) for kind in ("alone", "together") for i in range(3)}
@@ -170,6 +192,26 @@ def test_an_engine_that_leaves_state_gets_a_process_a_cell():
         "alone": 1,
         "together": 3,
     }
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ENGINES)
+def test_no_engine_remembers_what_it_played(name: str):
+    first, *others = ("slow_collision", "line_gas", "falling_box")
+    tasks = {
+        key: partial(
+            play_here, Cell(scene, 0, name, 1), ENGINES[name], replace(scenario(scene), truth=None)
+        )
+        for key, scene in (
+            ("before", first),
+            *((other, other) for other in others),
+            ("after", first),
+        )
+    }
+    played = dict(run_all(tasks, workers=1))
+
+    assert played["before"].file == played["after"].file
+    assert not ENGINES[name].leaves_state
 
 
 def fails() -> None:
