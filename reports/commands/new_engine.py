@@ -87,6 +87,14 @@ def ported(kind: str, hints: Hints) -> str:
     if code is not None and kind == "javascript":
         for name in settable:  # each scene sets it
             code = re.sub(rf"\bconst\b(?=[^;\n]*\b{name}\s*=[^=])", "let", code)
+    move, collide = hints.move or "move", hints.collide or "collide"
+    used = {"--step": hints.step} if hints.step else {"--move": move, "--collide": collide}
+    for option, name in used.items():
+        (function,) = re.findall(r"(\w+)$", name.partition("(")[0].strip()) or [name]
+        if code is not None and not re.search(rf"\b{re.escape(function)}\b", code):
+            refuse(
+                f"{option} {name}: {hints.source} has no {function}; name a function that it has"
+            )
     dt = [] if hints.per_frame else ["dt"]
     template = AROUND[kind].read_text(encoding="utf-8")
     return environment().overlay(autoescape=False).from_string(template).render(
@@ -94,8 +102,8 @@ def ported(kind: str, hints: Hints) -> str:
         fields=[*zip(FIELDS.split(), fields)],
         code=code,
         ball=hints.ball or {"javascript": "{}", "python": "SimpleNamespace()"}[kind],
-        move_call=call(hints.move or "move", ["ball"], dt),
-        collide_call=call(hints.collide or "collide", ["a", "b"], []),
+        move_call=call(move, ["ball"], dt),
+        collide_call=call(collide, ["a", "b"], []),
         step=hints.step and call(hints.step, [], dt),
         restitution=restitution,
         restitution_name=variable,

@@ -32,10 +32,7 @@ from crosscheck2d.reports.terminal.exits import DONE, FAILED, Unusable, keeping,
 from crosscheck2d.reports.terminal.progress import Progress
 from crosscheck2d.scenarios.files.scene_file import SceneFileError, read_scene_file
 
-SEE = (
-    "limits.csv and stability.html have the names of all, or tests/data/stability_limits.csv; for"
-    " --vary see --help"
-)
+SEE = "crosscheck list cases has the names of all; for --vary see --help"
 COLUMNS = (
     *("engine", "profile", "case", "parameter", "works_at", "fails_at", "unit", "predicate"),
     *("seeds", "reason", "verdict", "failed_fraction", "runs", "monotone", "spacing", "tested"),

@@ -280,6 +280,7 @@ def test_hints_without_a_code_leave_a_place_for_it(name: str, code: str, tmp_pat
         ('--box "w"', "must be the names of its width and its height"),
         ("--pixels 0", "--pixels 0: must be above 0"),
         ("--from nothing.py", "--from nothing.py"),
+        (f"--from {STRANGERS / 'functions.py'} --move fly", "has no fly; name a function"),
         (f"--from {STRANGERS / 'whole_step.js'}", "is in another language"),
     ],
 )
