@@ -280,9 +280,14 @@ def row_of(name: str) -> EngineRow:
     return row or ENGINES[name]
 
 
+def all_rows() -> dict[str, EngineRow]:
+    """The engines of this project by name, also those that play only where they are asked for."""
+    return ENGINES | FETCHED | NAMED
+
+
 def packages() -> dict[str, tuple[str, bool]]:
     # Engine -> the package that other versions of it come in, and whether it is npm's.
-    rows = ((name.partition(":")[0], row) for name, row in (ENGINES | FETCHED | NAMED).items())
+    rows = ((name.partition(":")[0], row) for name, row in all_rows().items())
     return {
         name: (row.package or row.wheel, bool(row.package))
         for name, row in rows
@@ -303,7 +308,7 @@ def parsed(name: str) -> tuple[str, LibraryAtVersion | None]:
 
 def known_row(name: str) -> EngineRow | None:
     usual, library = parsed(name)
-    row = (ENGINES | FETCHED | NAMED).get(usual)
+    row = all_rows().get(usual)
     if row is None or library is None:
         return row
     assert isinstance(row.make, partial)

@@ -23,8 +23,12 @@ class Searched:
 
 
 @cache
+def read_table() -> dict[str, Any]:
+    return tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+
+
 def read_searched(engine: str) -> Searched:
-    table = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))[engine]
+    table = read_table()[engine]
     settings = table["settings"]
     return Searched(
         {name: row["chosen"] for name, row in settings.items()},

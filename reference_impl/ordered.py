@@ -447,6 +447,8 @@ def solve_pushes(
     along, effect, way = np.zeros(m), np.zeros(m), np.zeros((bodies, 2))
     for c in range(m):
         scale = max(scale, -open[c])
+    # No contact pushes more than stops all of them: a row of disks that fills a box from wall to
+    # wall could push itself as hard as rounding says.
     most = scale * mass_of(weight)
     for _ in range(TURNS * (m + TURNS)):
         square, closing = 0.0, 0.0
@@ -480,9 +482,7 @@ def solve_pushes(
 
 @compiled
 def mass_of(weight) -> float:
-    """kg: of the disks of all contacts, each as often as it touches. No contact pushes more than
-    stops them all: a row of disks that fills a box from wall to wall could push itself as hard as
-    rounding says."""
+    """kg: of the disks of all contacts, each as often as it touches."""
     mass = 0.0
     for w in weight.reshape(-1):
         mass += 1.0 / w if w > 0.0 else 0.0

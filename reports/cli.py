@@ -302,9 +302,10 @@ def check(
 
         write_scaffold(scaffold, path, points, hints)
         return
+    folder = None
     # a name with a suffix is a file, such as marks.csv, of which --format has to say what it holds
-    keeps = outs and len(outs) == 1 and not formats and not outs[0].suffix and isdir(path)
-    folder = outs.pop() if keeps and outs else None
+    if outs and len(outs) == 1 and not formats and not outs[0].suffix and isdir(path):
+        folder = outs.pop()
     if fresh and folder is None:
         refuse("--fresh: is for the results of a class that --out FOLDER keeps")
     outputs = outputs_of(as_json, junit, formats or [], outs or [])

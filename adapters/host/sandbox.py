@@ -98,7 +98,8 @@ def bubblewrap() -> str | None:
 
 @cache
 def compile_driver() -> None:
-    compile_dir(GUEST, quiet=2)  # a guest may not write there; nor may we, perhaps
+    # A guest cannot write bytecode. If this program cannot either, each guest compiles anew.
+    compile_dir(GUEST, quiet=2)
 
 
 @cache

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from crosscheck2d.adapters.engines import ENGINES, FETCHED, NAMED, packages
+from crosscheck2d.adapters.engines import all_rows, packages
 from crosscheck2d.adapters.npm_packages import missing
 from crosscheck2d.reports.compare.metrics import METRICS
 from crosscheck2d.reports.compare.scales import SCALES
@@ -21,7 +21,7 @@ VERSIONS = f"Any version of {', '.join(packages())} plays as NAME@VERSION: --eng
 def explain(what: str) -> None:
     """Print a line for everything that has a name, or for all of one kind."""
     engines, scenarios = {}, {}
-    for name, row in (ENGINES | FETCHED | NAMED).items():
+    for name, row in all_rows().items():
         reason = missing(row.package) if row.package else ""
         engines[name] = f"{row.summary} ({reason})" if reason else row.summary
     for name in SCENARIOS:

@@ -89,9 +89,9 @@ def ported(kind: str, hints: Hints) -> str:
             code = re.sub(rf"\bconst\b(?=[^;\n]*\b{name}\s*=[^=])", "let", code)
     move, collide = hints.move or "move", hints.collide or "collide"
     used = {"--step": hints.step} if hints.step else {"--move": move, "--collide": collide}
-    for option, name in used.items():
+    for option, name in used.items() if code is not None else ():
         (function,) = re.findall(r"(\w+)$", name.partition("(")[0].strip()) or [name]
-        if code is not None and not re.search(rf"\b{re.escape(function)}\b", code):
+        if not re.search(rf"\b{re.escape(function)}\b", str(code)):
             refuse(
                 f"{option} {name}: {hints.source} has no {function}; name a function that it has"
             )

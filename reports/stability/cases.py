@@ -32,7 +32,7 @@ from crosscheck2d.reports.stability.limits import (
     step_size,
     with_variant,
 )
-from crosscheck2d.reports.stability.predicates import Predicate, largest, predicate, read, worst_of
+from crosscheck2d.reports.stability.predicates import largest, predicate, read, worst_of
 from crosscheck2d.scenarios.catalogue import RANDOM, SCENARIOS, scenario
 from crosscheck2d.scenarios.files.scene_file import read_scene_file
 from crosscheck2d.scenarios.model import (
@@ -281,15 +281,38 @@ def cannot_vary(whole: Scenario, what: str) -> str | None:
 SCENES = cases_few.SCENES | cases_few.SCENES_WITH_FRICTION | cases_many.SCENES
 PREDICATES = {
     row.name: row
-    for module in (predicates, predicates_gas)
-    for row in vars(module).values()
-    if isinstance(row, Predicate)
+    for row in (
+        predicates.collisions_missed,
+        predicates.spurious_collisions,
+        predicates.restitution_off,
+        predicates.wrong_distance,
+        predicates.velocity_off,
+        predicates.deviation,
+        predicates.angle_off,
+        predicates.spring_grows,
+        predicates.bounce_off,
+        predicates.friction_off,
+        predicates.rolling_off,
+        predicates.slips,
+        predicates.creeps,
+        predicates.does_not_stand,
+        predicates.ejected,
+        predicates.still_overlap,
+        predicates.bursts,
+        predicates.not_at_rest,
+        predicates_gas.energy_drifts,
+        predicates_gas.momentum_drifts,
+        predicates_gas.diverges,
+        predicates_gas.temperatures_part,
+        predicates_gas.wrong_gas,
+    )
 }
 PLAYS = {play.__name__: play for play in (cases_few.on_spring, reversed_order, restarted)}
 
 
 def read_case(name: str, row: dict[str, Any]) -> Case:
     """The case of a row of cases.toml."""
+    row = dict(row)
     also = WITH_FRICTION_ONLY if name in cases_few.SCENES_WITH_FRICTION else ()
     for variant in row.pop("variants", ()):
         also += with_variant(variant)

@@ -16,7 +16,7 @@ import pytest
 
 from crosscheck2d.adapters.host.file import SolverFailed, SolverText
 from crosscheck2d.adapters.host.process import SolverProcess
-from crosscheck2d.adapters.host.sandbox import Level, bubblewrap, levels
+from crosscheck2d.adapters.host.sandbox import RUN, Level, bubblewrap, levels
 from crosscheck2d.adapters.system import KERNEL
 from tests.adapters.attacks import CALLED, FORBIDDEN, FORGED, LEFT_BEHIND
 
@@ -139,7 +139,7 @@ def state() -> tuple[object, ...]:
 def running() -> set[int]:
     found = set()
     for process in psutil.process_iter(["cmdline", "ppid"]):
-        if any("import driver" in word for word in process.info["cmdline"] or ()):
+        if RUN in (process.info["cmdline"] or ()):
             with suppress(psutil.NoSuchProcess):  # it ends meanwhile
                 above = {parent.pid for parent in process.parents()}
                 if os.getpid() in above or process.info["ppid"] == 1:

@@ -18,6 +18,7 @@ import pytest
 from crosscheck2d.adapters import system
 from crosscheck2d.adapters.host.file import SolverFailed, read_solver
 from crosscheck2d.adapters.host.process import SolverProcess
+from crosscheck2d.adapters.host.sandbox import RUN
 from crosscheck2d.reports.run.results import COMMAND, RunResults
 from crosscheck2d.reports.run.store import reading
 from tests.reports.terminal.command_line import CROSSCHECK, crosscheck
@@ -253,7 +254,7 @@ def is_forked(process: psutil.Process) -> bool:
         return (
             parent is not None
             and "python" in process.name()
-            and "import driver" in " ".join(process.cmdline())
+            and RUN in process.cmdline()
             and parent.cmdline() == process.cmdline()
         )
     return False

@@ -97,7 +97,7 @@ class Neighbours:
 
     def find_spec(self, name: str, _path: Any = None, _target: Any = None) -> ModuleSpec | None:
         place = name.replace(".", "/")
-        loader: Any = self  # of `Loader`, whose module takes 9 ms, it has what is called
+        loader: Any = self  # no subclass of `Loader`: importing importlib.abc takes 9 ms
         for file, package in ((f"{place}/__init__.py", True), (f"{place}.py", False)):
             if file in self.texts:
                 return ModuleSpec(name, loader, origin=file, is_package=package)

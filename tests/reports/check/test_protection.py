@@ -14,7 +14,7 @@ from typing import Any
 import psutil
 import pytest
 
-from crosscheck2d.adapters.host.sandbox import GUEST, Level, levels
+from crosscheck2d.adapters.host.sandbox import GUEST, RUN, Level, levels
 from crosscheck2d.reports.check.questions import QUESTIONS, use_seed
 from tests.adapters.attacks import GRADED
 from tests.adapters.test_host import HEAD
@@ -145,7 +145,7 @@ def test_a_hostile_hand_in_earns_nothing_and_harms_nobody(tmp_path: Path):
         for p in psutil.process_iter(["cmdline", "ppid"])
         if p.info["ppid"] == 1
     ]
-    assert not [words for words in commands if any("import driver" in word for word in words)]
+    assert not [words for words in commands if RUN in words]
 
 
 def recorded() -> str:
