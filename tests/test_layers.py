@@ -138,7 +138,8 @@ def loaded_twice(modules: Iterable[ModuleType]) -> dict[Path, set[str]]:
     names: dict[Path, set[str]] = {}
     for module in modules:
         file = getattr(module, "__file__", None)
-        if file and ROOT in (path := Path(file).resolve()).parents:
+        # not those of libraries in the environment of a clone: toolz of dask has two names
+        if file and ROOT in (path := Path(file).resolve()).parents and ".venv" not in path.parts:
             names.setdefault(path, set()).add(getattr(module, "__name__", ""))
     return {path: spellings for path, spellings in names.items() if len(spellings) > 1}
 
