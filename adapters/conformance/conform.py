@@ -10,6 +10,7 @@ from crosscheck2d.adapters.conformance.physics import LAWS, PHYSICS
 from crosscheck2d.adapters.conformance.probe import Probe, ProbeReading
 from crosscheck2d.adapters.engine import NotLoaded, Unsupported
 from crosscheck2d.adapters.engine_row import EngineRow
+from crosscheck2d.adapters.friction import Frictionless
 from crosscheck2d.adapters.host.process import processes_reused
 
 PROBES: dict[str, Probe] = CONTRACT | PHYSICS | LAWS
@@ -63,25 +64,25 @@ def not_probed(
 
 
 def ask(engine: str, profile: str, name: str, row: EngineRow) -> Finding:
-    probe = PROBES[name]
+    probe, own_file = PROBES[name], bool(row.source)  # whose values come from the harness
+    excused = name in row.departs or (probe.handed_on and own_file)
+    missed: str = "departs" if excused else probe.failure
     try:
         reading = probe.read(row)
-        verdict = "keeps" if reading.kept else missed(name, row)
+        verdict = "keeps" if reading.kept else missed
     except NotLoaded:
         raise
+    except Frictionless as refusal:  # a solver need not model friction
+        reading = ProbeReading("not modelled", "not modelled", note=str(refusal))
+        verdict = "keeps"
     except Unsupported as refusal:
         reading, verdict = ProbeReading("refused", "an answer", note=str(refusal)), "not asked"
     except Exception as error:  # an engine may raise anything; the finding records it
         reading = ProbeReading("raised", "an answer", note=f"{type(error).__name__}: {error}")
-        verdict = "departs" if row.exercise else missed(name, row) if row.source else "breaks"
+        verdict = "departs" if row.exercise else missed if own_file else "breaks"
     # `crosscheck check` says what a solver of the exercise breaks, whose e may be its own
     departure = "" if verdict == "keeps" or row.exercise else reading.departure or ""
     got, expected, bound, note, _ = reading
     return Finding(
         engine, profile, name, probe.asked, got, expected, bound, verdict, note, departure
     )
-
-
-def missed(name: str, row: EngineRow) -> str:
-    probe, own_file = PROBES[name], bool(row.source)  # whose values come from the harness
-    return "departs" if name in row.departs or (probe.handed_on and own_file) else probe.failure

@@ -21,6 +21,7 @@ from crosscheck2d.adapters.conformance.probe import (
     Probe,
     ProbeReading,
     act_on,
+    before_and_after,
     first_difference,
     head_on,
     history,
@@ -45,8 +46,8 @@ def order_and_shapes(row: EngineRow) -> ProbeReading:
     """Three disks of which the middle one is static; float32 rounds by 2^-24, twice if units are
     scaled."""
     scene = scene_of(
-        position=[[1.0, 2.0], [-3.0, 0.5], [0.1, -4.0]],
-        velocity=[[0.3, -0.7], [0.0, 0.0], [1.1, 0.2]],
+        [[1.0, 2.0], [-3.0, 0.5], [0.1, -4.0]],
+        [[0.3, -0.7], [0.0, 0.0], [1.1, 0.2]],
         angle=[0.2, -1.0, 7.0],
         angular_velocity=[0.9, 0.0, -1.3],
         radius=[0.5, 1.0, 0.25],
@@ -112,7 +113,7 @@ def load_forgets(row: EngineRow) -> ProbeReading:
 
 def worlds_are_separate(row: EngineRow) -> ProbeReading:
     # A second engine of the same kind, a hundred times as large, changes nothing in the first.
-    large = scene_of(position=[[0.0, 0.0]], velocity=[[1.0, 0.0]], radius=[50.0], mass=[1.0])
+    large = scene_of([[0.0, 0.0]], [1.0, 0.0], radius=50.0)
     scenes = simplified(plain())
     with loaded(row, *scenes) as alone:
         wanted = history(alone)
@@ -139,10 +140,9 @@ def steps_obey_dt(row: EngineRow) -> ProbeReading:
     # v dt a step, for two dt; a position rounds once a step.
     worst, steps, speed = 0.0, 64, 1.5
     for dt in (DT, 0.01):
-        with loaded(row, one_disk(velocity=(speed, 0.0)), dt=dt) as engine:
-            start = engine.read().position
-            engine.step(steps)
-            worst = max(worst, abs((engine.read().position - start)[0, 0] / (steps * dt) - speed))
+        before, after = before_and_after(row, one_disk((speed, 0.0)), steps=steps, dt=dt)
+        way = (after.position - before.position)[0, 0]
+        worst = max(worst, abs(way / (steps * dt) - speed))
     return ProbeReading(speed + worst, speed, row.rounding * steps * speed)
 
 
@@ -158,30 +158,21 @@ def stays_finite(row: EngineRow) -> ProbeReading:
 def force_lasts_one_step(row: EngineRow) -> ProbeReading:
     # One force, then one step, then three: the speed is the same after the first step and after
     # all.
-    force, torque = np.array([20.0, 10.0]), 3.0
+    force, torque = (20.0, 10.0), 3.0
     with loaded(row, one_disk()) as engine:
-        try:
-            engine.apply_force(0, force, torque)
-        except Unsupported:  # it may model forces without rotation
-            torque = 0.0
-            engine.apply_force(0, force, torque)
+        turns = act_on(engine, 0, force, torque)  # it may model forces without rotation
         engine.step()
         first = engine.read()
         engine.step(3)
         last = engine.read()
     with loaded(row, one_disk()) as engine:
-        engine.apply_force(0, force, torque)
+        engine.apply_force(0, np.array(force), torque if turns else 0.0)
         engine.step(4)
         at_once = engine.read()
-    spin = first.angular_velocity
-    turning = [(last.angular_velocity, spin), (at_once.angular_velocity, spin)] if torque else []
     ratios = [
-        largest(later) / largest(once) if largest(once) else np.inf
-        for later, once in (
-            (last.velocity, first.velocity),
-            (at_once.velocity, first.velocity),
-            *turning,
-        )
+        largest(getattr(later, rate)) / once if (once := largest(getattr(first, rate))) else np.inf
+        for rate in ("velocity", "angular_velocity")[: 1 + turns]
+        for later in (last, at_once)
     ]
     # Nothing acts on the disk afterwards, so its velocity is not even rounded again.
     return ProbeReading(max(ratios, key=lambda ratio: abs(ratio - 1)), 1.0, 4 * row.rounding)
@@ -205,17 +196,14 @@ def same_instant(row: EngineRow) -> ProbeReading:
     # After 1 s of free fall the speed is g t; a velocity half a step off would differ by g dt / 2 =
     # 0.02 m/s.
     steps, gravity = 256, 9.81
-    with loaded(row, one_disk(gravity=gravity)) as engine:
-        engine.step(steps)
-        speed = -float(engine.read().velocity[0, 1])
+    _, state = before_and_after(row, one_disk(gravity=gravity), steps=steps)
+    speed = -float(state.velocity[0, 1])
     return ProbeReading(speed, gravity * steps * DT, row.rounding * steps * gravity)
 
 
 BETWEEN_WALLS = scene_of(
-    position=[[0.0, 9.0], [0.0, 0.0]],
-    velocity=[[0.0, 0.0], [2.0, 0.0]],
-    radius=[0.5, 0.5],
-    mass=[1.0, 1.0],
+    [[0.0, 9.0], [0.0, 0.0]],
+    [[0.0, 0.0], [2.0, 0.0]],
     walls=[[[-0.53, -2.0], [-0.53, 2.0]], [[0.53, -2.0], [0.53, 2.0]]],
 )
 
@@ -257,9 +245,8 @@ def static_stays(row: EngineRow) -> ProbeReading:
     # A static disk keeps its state to the bit under a collision and a force. The collision is asked
     # for if the engine reports any.
     scene = scene_of(
-        position=[[-1.02, 0.1], [0.0, 0.0]],
-        velocity=[[2.0, 0.0], [0.0, 0.0]],
-        radius=[0.5, 0.5],
+        [[-1.02, 0.1], [0.0, 0.0]],
+        [[2.0, 0.0], [0.0, 0.0]],
         mass=[1.0, np.inf],
         gravity=[0.0, -9.8],
     )

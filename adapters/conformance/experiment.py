@@ -14,11 +14,11 @@ import numpy as np
 import pandas as pd
 
 from crosscheck2d.adapters.conformance.impact_table import PHASES, README, replace_table
-from crosscheck2d.adapters.engine import Engine, Unsupported
+from crosscheck2d.adapters.engine import Unsupported
 from crosscheck2d.adapters.engine_row import EngineRow
 from crosscheck2d.adapters.engines import ENGINES, FETCHED
 from crosscheck2d.scenarios.families.experiment import MEASURED, SPEED, oblique_impacts
-from crosscheck2d.scenarios.model import Array
+from crosscheck2d.scenarios.model import Array, State
 
 KEPT = Path(__file__).with_name("experiment.csv")
 MARK = "experiment table"
@@ -27,42 +27,34 @@ LEAD = 4  # steps before the impact, and its phase
 QUANTITIES = {"e_t": "speed along the plate, after / before", "spin_rad_s": "spin after, rad/s"}
 
 
-def outcomes(velocity: Array, spin: Array) -> dict[str, Array]:
-    """(m,) of each quantity, of the velocities (m, 2) m/s and spins (m,) rad/s after the impacts.
+def outcomes(end: State) -> dict[str, Array]:
+    """(m,) of each quantity, of the state after the impacts.
 
     Friction turns a sphere that moves to the right clockwise; the experiment states the amount.
     """
     along = SPEED * np.sin(np.radians(MEASURED["angle_deg"]))
-    return {"e_t": velocity[:, 0] / along, "spin_rad_s": -spin}
+    return {"e_t": end.velocity[:, 0] / along, "spin_rad_s": -end.angular_velocity}
 
 
 def exact() -> dict[str, Array]:
     scenario = oblique_impacts(DT, LEAD)
     assert scenario.truth is not None
-    end = scenario.truth(scenario.times[-1:]).at(0)
-    return outcomes(end.velocity, end.angular_velocity)
-
-
-def played(engine: Engine) -> dict[str, Array]:
-    """(phases, m) of each quantity."""
-    runs = []
-    for phase in PHASES:
-        scenario = oblique_impacts(DT, LEAD + phase)
-        engine.load(scenario.scene, DT)
-        engine.step(scenario.intervals)
-        end = engine.read()
-        runs.append(outcomes(end.velocity, end.angular_velocity))
-    return {key: np.array([run[key] for run in runs]) for key in QUANTITIES}
+    return outcomes(scenario.truth(scenario.times[-1:]).at(0))
 
 
 def rows_of(name: str, row: EngineRow, expected: Mapping[str, Array]) -> list[dict[str, object]]:
     """A row for each measured number, with the median and the range over `PHASES`; none if the
     engine refuses the scene."""
+    runs = []
     with closing(row.make()) as engine:
-        try:
-            runs = played(engine)
-        except Unsupported:
-            return []
+        for phase in PHASES:
+            scenario = oblique_impacts(DT, LEAD + phase)
+            try:
+                engine.load(scenario.scene, DT)
+                engine.step(scenario.intervals)
+                runs.append(outcomes(engine.read()))
+            except Unsupported:
+                return []
     return [
         {
             "quantity": key,
@@ -70,9 +62,9 @@ def rows_of(name: str, row: EngineRow, expected: Mapping[str, Array]) -> list[di
             "experiment": MEASURED[key][k],
             "exact": expected[key][k],
             "engine": name,
-            "value": np.median(runs[key][:, k]),
-            "low": runs[key][:, k].min(),
-            "high": runs[key][:, k].max(),
+            "value": np.median(values := [run[key][k] for run in runs]),
+            "low": min(values),
+            "high": max(values),
         }
         for key in QUANTITIES
         for k in np.flatnonzero(~np.isnan(MEASURED[key]))

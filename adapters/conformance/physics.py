@@ -10,12 +10,12 @@ phases of a step.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import replace
-from functools import partial, wraps
+from functools import partial
 from itertools import product
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,7 +26,7 @@ from crosscheck2d.adapters.conformance.probe import (
     Departure,
     Probe,
     ProbeReading,
-    collided,
+    before_and_after,
     head_on,
     largest,
     load_first,
@@ -37,7 +37,6 @@ from crosscheck2d.adapters.conformance.probe import (
 )
 from crosscheck2d.adapters.engine import Unsupported
 from crosscheck2d.adapters.engine_row import EngineRow
-from crosscheck2d.adapters.friction import Frictionless
 from crosscheck2d.scenarios.model import Array, Scene
 
 SPEEDS = (0.01, 0.1, 0.5, 2.0, 10.0, 100.0)  # m/s, on both sides of Box2D's threshold of 1
@@ -56,12 +55,10 @@ def free_flight(row: EngineRow) -> ProbeReading:
     of `ORDERS_OF_UPDATES`."""
     steps, gravity, speed = 256, 9.81, 4.1
     t = steps * DT
-    with loaded(row, one_disk(velocity=(0.0, speed), gravity=gravity)) as engine:
-        start = float(engine.read().position[0, 1])
-        engine.step(steps)
-        moved = float(engine.read().position[0, 1]) - start
+    states = before_and_after(row, one_disk((0.0, speed), gravity=gravity), steps=steps)
+    start, end = (float(state.position[0, 1]) for state in states)
     bound = row.rounding * steps * (1.0 + gravity * t * t)
-    offset = moved - (speed * t - gravity * t * t / 2)
+    offset = end - start - (speed * t - gravity * t * t / 2)
     alphas = ORDERS_OF_UPDATES if np.isnan(row.alpha) else (row.alpha,)
     laws = [-(alpha - 0.5) * gravity * DT * t for alpha in alphas]
     return ProbeReading(offset, min(laws, key=lambda law: abs(law - offset)), bound)
@@ -71,9 +68,7 @@ def coasting(
     row: EngineRow, steps: int, dt: float = DT, speed: float = 0.0, spin: float = 0.0
 ) -> ProbeReading:
     """Speed in m/s or spin in rad/s of a free disk: nothing acts on it, and it is not rounded."""
-    with loaded(row, one_disk((speed, 0.0), spin), dt=dt) as engine:
-        engine.step(steps)
-        state = engine.read()
+    _, state = before_and_after(row, one_disk((speed, 0.0), spin), steps=steps, dt=dt)
     got = float(state.angular_velocity[0] if spin else state.velocity[0, 0])
     return ProbeReading(got, speed or spin, 2 * row.rounding * (speed or spin))
 
@@ -94,13 +89,12 @@ def pair_momentum(row: EngineRow) -> ProbeReading:
     changes = []
     for masses in ((1.0, 7.0), (2.0, 2.0)):
         scene = scene_of(
-            position=[[-0.52, 0.2], [0.5, -0.1]],
-            velocity=[[2.0, 0.3], [-1.0, 0.1]],
-            radius=[0.5, 0.5],
+            [[-0.52, 0.2], [0.5, -0.1]],
+            [[2.0, 0.3], [-1.0, 0.1]],
             mass=masses,
             angular_velocity=[3.0, -2.0],
         )
-        states = collided(row, *without_spin_and_gravity(scene))
+        states = before_and_after(row, *without_spin_and_gravity(scene))
         before, after = (state.velocity for state in states)
         if np.abs(after - before).max() < 0.1:
             return ProbeReading("no collision", 0.0, departure=Departure.PASSES)
@@ -114,74 +108,41 @@ def pair_momentum(row: EngineRow) -> ProbeReading:
 
 
 def restitution(row: EngineRow, closing: float) -> ProbeReading:
-    before, after = (state.velocity for state in collided(row, head_on(closing)))
+    before, after = (state.velocity for state in before_and_after(row, head_on(closing)))
     e = float((after[2] - after[1])[0] / (before[1] - before[2])[0])
     return ProbeReading(e, 0.5, ROUNDINGS * row.rounding)
 
 
 def wall_restitution(row: EngineRow) -> ProbeReading:
-    scene = scene_of(
-        position=[[0.0, 0.0]],
-        velocity=[[2.0, 0.0]],
-        radius=[0.5],
-        mass=[7.3],
-        walls=[[[0.53, -2.0], [0.53, 2.0]]],
-    )
-    with loaded(row, scene) as engine:
-        engine.step(24)
-        return ProbeReading(
-            -float(engine.read().velocity[0, 0]) / 2.0, 0.5, ROUNDINGS * row.rounding
-        )
+    scene = scene_of([[0.0, 0.0]], [2.0, 0.0], mass=7.3, walls=[[[0.53, -2.0], [0.53, 2.0]]])
+    _, after = before_and_after(row, scene)
+    return ProbeReading(-float(after.velocity[0, 0]) / 2.0, 0.5, ROUNDINGS * row.rounding)
 
 
-def friction(row: EngineRow) -> ProbeReading:
-    # The friction of a collision where none is stated: the sideways part is 0, and not even
-    # rounded.
-    return ProbeReading(sideways(row, head_on(2.0, spin=40.0)), 0.0, row.rounding)
-
-
-def sideways(row: EngineRow, scene: Scene) -> float:
+def friction_in_bounce(row: EngineRow, restitution: float, friction: float) -> ProbeReading:
     """Sideways over normal momentum taken up by a disk in a head-on collision of two that spin so
-    fast that they slide all through it: the effective coefficient of friction."""
-    before, after = collided(row, scene)
-    taken = (after.velocity - before.velocity)[1]
-    return float(abs(taken[1] / taken[0])) if taken[0] else np.nan
+    fast that they slide all through it: the effective coefficient of friction. Where none is
+    stated the sideways part is 0, and not even rounded."""
+    scene = replace(head_on(2.0, spin=40.0), restitution=restitution, friction=friction)
+    before, after = before_and_after(row, scene)
+    normal, sideways = (after.velocity - before.velocity)[1]
+    got = float(abs(sideways / normal)) if normal else np.nan
+    return ProbeReading(got, friction, (ROUNDINGS if friction else 1) * row.rounding)
 
 
-def where_modelled(read: Callable[..., ProbeReading]) -> Callable[..., ProbeReading]:
-    """A probe of friction, for engines that model it; a solver may refuse friction."""
-
-    @wraps(read)
-    def asked(row: EngineRow, **parameters: float) -> ProbeReading:
-        try:
-            return read(row, **parameters)
-        except Frictionless as refusal:
-            return ProbeReading("not modelled", "not modelled", note=str(refusal))
-
-    return asked
-
-
-@where_modelled
-def friction_in_bounce(row: EngineRow, restitution: float) -> ProbeReading:
-    scene = replace(head_on(2.0, spin=40.0), restitution=restitution, friction=FRICTION)
-    return ProbeReading(sideways(row, scene), FRICTION, ROUNDINGS * row.rounding)
-
-
-@where_modelled
 def friction_at_rest(row: EngineRow) -> ProbeReading:
     """Deceleration over g of a disk that slides on a floor and does not bounce, from 1/8 s to
     3/8 s; a velocity rounds twice a step."""
     steps, gravity, speed = 64, 10.0, 4.0
     scene = scene_of(
+        [[0.0, 0.5]],
+        [speed, 0.0],
         restitution=0.0,
-        position=[[0.0, 0.5]],
-        velocity=[[speed, 0.0]],
-        radius=[0.5],
-        mass=[1.0],
+        friction=FRICTION,
         gravity=[0.0, -gravity],
         walls=[[[-8.0, 0.0], [8.0, 0.0]]],
     )
-    with loaded(row, replace(scene, friction=FRICTION)) as engine:
+    with loaded(row, scene) as engine:
         engine.step(steps // 2)  # by then it lies on the floor
         early = float(engine.read().velocity[0, 0])
         engine.step(steps)
@@ -224,12 +185,13 @@ PHYSICS: dict[str, Probe] = {
         "What is e of a wall collision at 2 m/s, where 0.5 is stated?", wall_restitution
     ),
     "friction": _Physics(
-        "What coefficient of friction acts between two disks, where none is stated?", friction
+        "What coefficient of friction acts between two disks, where none is stated?",
+        partial(friction_in_bounce, restitution=0.5, friction=0.0),
     ),
     **{
         f"friction_{e:g}": _Physics(
             f"What friction acts in a bounce with e = {e:g}, where {FRICTION} is stated?",
-            partial(friction_in_bounce, restitution=e),
+            partial(friction_in_bounce, restitution=e, friction=FRICTION),
         )
         for e in (0.0, 0.5, 1.0)
     },
@@ -272,14 +234,13 @@ def dt_is_obeyed(row: EngineRow) -> ProbeReading:
     for speed in FREE_SPEEDS:
         paths = []
         for dt in (DT, COARSER):
-            with loaded(row, one_disk((speed, 0.0)), dt=dt) as engine:
-                start = engine.read().position[0, 0]
-                engine.step(FREE_STEPS)
-                state = engine.read()
-            final = float(state.velocity[0, 0])
+            disk = one_disk((speed, 0.0))
+            before, after = before_and_after(row, disk, steps=FREE_STEPS, dt=dt)
+            final = float(after.velocity[0, 0])
             if not abs(final - speed) <= ALLOWED * speed:
                 return ProbeReading(final, speed, ALLOWED * speed, departure=Departure.SPEED)
-            paths.append(float(state.position[0, 0] - start) / (FREE_STEPS * dt))
+            way = float(after.position[0, 0] - before.position[0, 0])
+            paths.append(way / (FREE_STEPS * dt))
         worst = max(paths, key=lambda path: abs(path - speed))
         by_step = abs(paths[0] * DT - paths[1] * COARSER) <= ALLOWED * abs(paths[0]) * DT
         law = Departure.DT_IGNORED if by_step and paths[0] else Departure.PATH
@@ -293,9 +254,8 @@ def gravity_is_stated(row: EngineRow) -> ProbeReading:
     """The acceleration of a disk from rest by its velocity, in m/s2, at two dt: without gravity,
     then under one to the side, or straight down if that is refused."""
     still, bound = replace(one_disk(), restitution=EXERCISE), ALLOWED * GRAVITY
-    with loaded(row, still) as engine:
-        engine.step(FREE_STEPS)
-        drift = float(np.hypot(*engine.read().velocity[0])) / (FREE_STEPS * DT)
+    _, after = before_and_after(row, still, steps=FREE_STEPS)
+    drift = float(np.hypot(*after.velocity[0])) / (FREE_STEPS * DT)
     if not drift <= bound:
         return ProbeReading(drift, 0.0, bound, departure=Departure.GRAVITY_UNSTATED)
     ways = np.multiply(GRAVITY, [(0.6, -0.8), (0.0, -1.0)])
@@ -310,11 +270,9 @@ def gravity_is_stated(row: EngineRow) -> ProbeReading:
     if np.hypot(*(worst - stated)) <= bound:
         return ProbeReading(size, GRAVITY, bound)
     if size <= bound:
-        with loaded(
-            row, replace(one_disk(), gravity=stated, velocity=np.array([[FREE_SPEEDS[0], 0.0]]))
-        ) as engine:
-            engine.step(FREE_STEPS)
-            falls = float(np.hypot(*(engine.read().velocity[0] - [FREE_SPEEDS[0], 0.0]))) > bound
+        thrown = replace(one_disk((FREE_SPEEDS[0], 0.0)), gravity=stated)
+        before, after = before_and_after(row, thrown, steps=FREE_STEPS)
+        falls = np.hypot(*(after.velocity - before.velocity)[0]) > bound
         law = Departure.GRAVITY_AT_REST if falls else Departure.GRAVITY_ABSENT
     elif np.hypot(*(read[0] * DT - read[1] * COARSER)) <= ALLOWED * np.hypot(*read[0]) * DT:
         law = Departure.DT_IGNORED
@@ -324,28 +282,26 @@ def gravity_is_stated(row: EngineRow) -> ProbeReading:
     return ProbeReading(got, expected, departure=law)
 
 
-def scene_before(impact: Impact, way: int, boxed: bool, phase: float, e: float) -> Scene:
-    """The scene of an impact, four steps and `phase` of one before it; `boxed`: the wall is one of
-    four around the disk."""
-    k = len(impact.masses)
-    normal, velocity = turn(impact, phase) * np.asarray(impact.ways[way])
-    start, along = -normal / 2 - velocity * DT * (4 + abs(phase)), np.array([-normal[1], normal[0]])
-    a, b, c, d = (20 * (i * along - j * normal) for i, j in ((-1, 0), (1, 0), (1, 1), (-1, 1)))
-    box = [[a, b], [b, c], [c, d], [d, a]]
-    fields: dict[str, Any] = {} if k > 1 else {"walls": box if boxed else box[:1]}
-    return scene_of(
-        e,
-        position=np.stack([start, normal / 2])[:k],
-        velocity=np.stack([velocity, np.zeros(2)])[:k],
-        radius=[0.5] * k,
-        mass=impact.masses,
-        **fields,
-    )
-
-
-def turn(impact: Impact, phase: float) -> float:
-    # The sign of the impact's directions at a phase: a wall is never turned.
-    return -1.0 if phase < 0 and len(impact.masses) > 1 else 1.0
+def scenes_before(impact: Impact, phase: float, e: float) -> list[tuple[Array, Scene]]:
+    """The direction of the impulse and the scene of each way, four steps and `phase` of one before
+    the impact; a wall is asked as one of four around the disk, then alone."""
+    k, scenes = len(impact.masses), list[tuple[Array, Scene]]()
+    sign = -1.0 if phase < 0 and k > 1 else 1.0  # a wall is never turned
+    for way in impact.ways:
+        n, v = sign * np.asarray(way)
+        along = np.array([-n[1], n[0]])
+        a, b, c, d = (20 * (i * along - j * n) for i, j in ((-1, 0), (1, 0), (1, 1), (-1, 1)))
+        box = [[a, b], [b, c], [c, d], [d, a]]
+        for walls in [[]] if k > 1 else [box, box[:1]]:
+            scene = scene_of(
+                [-n / 2 - v * DT * (4 + abs(phase)), n / 2][:k],
+                [v, np.zeros(2)][:k],
+                mass=impact.masses,
+                restitution=e,
+                walls=np.reshape(walls, (-1, 2, 2)),
+            )
+            scenes.append((n, scene))
+    return scenes
 
 
 def strikes(row: EngineRow, impact: Impact, e: float) -> list[tuple[Array, Array, Array]]:
@@ -353,15 +309,13 @@ def strikes(row: EngineRow, impact: Impact, e: float) -> list[tuple[Array, Array
     strikes, before and after."""
     seen = []
     for phase in PHASES:
-        kinds = list(product(range(len(impact.ways)), (True, False)))
-        scenes = [scene_before(impact, *kind, phase, e) for kind in kinds]
+        scenes = scenes_before(impact, phase, e)
         with closing(row.make()) as engine:
-            played = load_first(engine, scenes, DT)
+            played = load_first(engine, [scene for _, scene in scenes], DT)
             before = engine.read().velocity
             engine.step(STEPS)
             after = engine.read().velocity
-        way, _ = kinds[[scene is played for scene in scenes].index(True)]
-        normal = turn(impact, phase) * np.asarray(impact.ways[way][0])
+        (normal,) = (n for n, scene in scenes if scene is played)
         seen.append((normal, *(v[0] - v[1:].sum(axis=0) for v in (before, after))))
     return seen
 

@@ -7,15 +7,16 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from functools import partial
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from crosscheck2d.adapters.engine import SILENT, Engine, Unsupported
 from crosscheck2d.adapters.engine_row import EngineRow
 from crosscheck2d.adapters.run import first_collisions
-from crosscheck2d.scenarios.model import Array, Scene, State, frozen
+from crosscheck2d.scenarios.families.placing import lay_out
+from crosscheck2d.scenarios.model import Array, Scene, State
 
 EXERCISE = 0.9  # the restitution that the exercise states
 DT = 1 / 256  # s; a power of two, so that multiples of it are exact
@@ -75,10 +76,13 @@ def loaded(row: EngineRow, *scenes: Scene, dt: float = DT) -> Iterator[Engine]:
         yield engine
 
 
-def collided(row: EngineRow, *scenes: Scene) -> tuple[State, State]:
-    with loaded(row, *scenes) as engine:
+def before_and_after(
+    row: EngineRow, *scenes: Scene, steps: int = 24, dt: float = DT
+) -> tuple[State, State]:
+    """The states of the first of `scenes` that a fresh engine does not refuse."""
+    with loaded(row, *scenes, dt=dt) as engine:
         before = engine.read()
-        engine.step(24)
+        engine.step(steps)
         return before, engine.read()
 
 
@@ -115,23 +119,14 @@ def without_spin_and_gravity(scene: Scene) -> tuple[Scene, ...]:
     return scene, replace(scene, **still), replace(scene, **light), replace(scene, **still, **light)
 
 
-def scene_of(restitution: float = 0.5, **arrays: ArrayLike) -> Scene:
-    fields: dict[str, Any] = {name: frozen(values) for name, values in arrays.items()}
-    return Scene(restitution=restitution, **fields)
+scene_of = partial(lay_out, radius=0.5, restitution=0.5)
 
 
 def one_disk(
     velocity: tuple[float, float] = (0.0, 0.0), spin: float = 0.0, gravity: float = 0.0
 ) -> Scene:
-    return scene_of(
-        position=[[0.25, -0.5]],
-        velocity=[velocity],
-        radius=[0.5],
-        mass=[7.3],
-        inertia=[0.9],
-        angular_velocity=[spin],
-        gravity=[0.0, -gravity],
-    )
+    rotation: dict[str, Any] = {"inertia": [0.9], "angular_velocity": [spin]}
+    return scene_of([[0.25, -0.5]], velocity, mass=7.3, gravity=[0.0, -gravity], **rotation)
 
 
 def head_on(closing: float, spin: float = 0.0, lead: float = 4.5) -> Scene:
@@ -139,20 +134,18 @@ def head_on(closing: float, spin: float = 0.0, lead: float = 4.5) -> Scene:
     0.5."""
     gap = closing * DT * lead
     return scene_of(
-        position=[[0.0, 9.0], [-0.5 - gap / 2, 0.0], [0.5 + gap / 2, 0.0]],
-        velocity=[[0.0, 0.0], [closing / 2, 0.0], [-closing / 2, 0.0]],
+        [[0.0, 9.0], [-0.5 - gap / 2, 0.0], [0.5 + gap / 2, 0.0]],
+        [[0.0, 0.0], [closing / 2, 0.0], [-closing / 2, 0.0]],
         angular_velocity=[0.0, spin, spin],
-        radius=[0.5, 0.5, 0.5],
-        mass=[1.0, 1.0, 1.0],
     )
 
 
 def plain() -> Scene:
     """Two disks that collide obliquely after 2 steps, fall, spin, and bounce off a floor."""
     return scene_of(
-        position=[[-0.42, 0.1], [0.0, 0.4]],
-        velocity=[[2.0, 0.0], [-1.0, 0.5]],
-        radius=[0.25, 0.25],
+        [[-0.42, 0.1], [0.0, 0.4]],
+        [[2.0, 0.0], [-1.0, 0.5]],
+        radius=0.25,
         mass=[1.0, 3.0],
         angle=[0.1, -0.2],
         angular_velocity=[1.0, -2.0],
@@ -161,11 +154,11 @@ def plain() -> Scene:
     )
 
 
-def reported(engine: Engine, dt: float = DT) -> str:
+def reported(engine: Engine) -> str:
     """The collisions an engine reports, as "disk 0 and disk 1, disk 0 and wall 2"; raises
     `Unsupported` for one that says it reports none."""
     must_report(engine)
-    collisions = first_collisions(engine.collisions(), dt)
+    collisions = first_collisions(engine.collisions(), DT)
     names = [
         (f"disk {i}", f"disk {j}" if j >= 0 else f"wall {-1 - j}")
         for i, j in zip(collisions.i, collisions.j)
