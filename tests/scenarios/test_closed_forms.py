@@ -1,4 +1,5 @@
-"""The exact answers, each against something that knows nothing of its closed form."""
+"""The closed forms, each against something that knows nothing of it. tests/adapters/event_driven/
+test_events.py has the event engine beside all of them, test_oracle.py the oracle."""
 
 from __future__ import annotations
 
@@ -8,8 +9,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from crosscheck2d.adapters.event_driven.events import EventEngine
 from crosscheck2d.scenarios.catalogue import SCENARIOS, scenario
-from crosscheck2d.scenarios.model import Scene
 from crosscheck2d.scenarios.truth.exact import OracleTruth
 
 ANSWERED = [
@@ -39,10 +40,6 @@ def between(collisions, until):
     return (apart + np.append(apart[1:], until)) / 2
 
 
-# An event-by-event simulation over all pairs, written here so that it shares nothing with the
-# closed forms.
-
-
 def wall_frames(scene):
     """A point of each wall and its unit normal, (w, 2) each."""
     along = scene.walls[:, 1] - scene.walls[:, 0]
@@ -50,73 +47,6 @@ def wall_frames(scene):
         scene.walls[:, 0],
         np.stack([-along[:, 1], along[:, 0]], -1) / np.hypot(*along.T)[:, None],
     )
-
-
-def next_events(scene: Scene, x, v):
-    """The earliest collision ahead: (time, disk, other disk or -1 - wall)."""
-    found = [(np.inf, 0, 0)]
-    a, b = np.triu_indices(scene.n, 1)
-    dr, dv, reach = x[b] - x[a], v[b] - v[a], scene.radius[a] + scene.radius[b]
-    closing, gap = (dr * dv).sum(1), (dr**2).sum(1) - reach**2
-    disc = closing**2 - (dv**2).sum(1) * gap
-    # After a collision at e = 0 nothing closes in; what is computed is the rounding of 1 m/s.
-    can = (closing < -1e-14) & (disc > 0)
-    if can.any():
-        t = np.full(len(a), np.inf)
-        t[can] = np.maximum(gap[can], 0) / (-closing[can] + np.sqrt(disc[can]))
-        found.append((t.min(), a[t.argmin()], b[t.argmin()]))
-    for w, (point, normal) in enumerate(zip(*wall_frames(scene))):
-        side = np.sign((scene.position - point) @ normal)
-        gap = np.maximum((x - point) @ normal * side - scene.radius, 0)
-        speed, acceleration = v @ normal * side, scene.gravity @ normal * side
-        under = speed**2 - 2 * acceleration * gap
-        for i in np.flatnonzero(np.isfinite(scene.mass)):
-            if speed[i] < 0 and under[i] > 0:
-                found.append((2 * gap[i] / (np.sqrt(under[i]) - speed[i]), i, -1 - w))
-            elif acceleration[i] < 0:
-                found.append(((speed[i] + np.sqrt(under[i])) / -acceleration[i], i, -1 - w))
-    return min(found)
-
-
-def simulate(scene: Scene, until):
-    """State after each collision up to `until`: a list of (t, position, velocity), the first one at
-    0."""
-    t, x, v = 0.0, np.array(scene.position), np.array(scene.velocity)
-    g, w = np.where(scene.static[:, None], 0.0, scene.gravity), 1 / scene.mass
-    path = [(t, x, v)]
-    while True:
-        after, i, j = next_events(scene, x, v)
-        if t + after > until:
-            return path
-        t, x, v = t + after, x + v * after + g * after**2 / 2, v + g * after
-        n = wall_frames(scene)[1][-1 - j] if j < 0 else (x[j] - x[i]) / np.hypot(*(x[j] - x[i]))
-        other, weight = (v[j], w[j]) if j >= 0 else (0, 0)
-        kick = (1 + scene.restitution) * (other - v[i]) @ n / (w[i] + weight)
-        v[i] += kick * w[i] * n
-        if j >= 0:
-            v[j] -= kick * w[j] * n
-        path.append((t, x, v))
-
-
-@pytest.mark.parametrize("name", FLYING)
-def test_truth_is_what_an_event_by_event_simulation_finds(name):
-    run, truth, until = exact(name)
-    path = simulate(run.scene, until)
-    collisions = truth.collisions.t[truth.collisions.t <= until]
-    # Rounding of the simulation, 1e-16 a collision over hundreds of collisions; on the two-disk
-    # orbit it grows to 1e-9 m.
-    tolerance = 1e-8 if name == "disk_between_static_disks" else 1e-10
-    np.testing.assert_allclose([t for t, _, _ in path[1:]], collisions, rtol=0, atol=tolerance)
-    times = between(collisions, until)
-    answer = run.truth(times)
-    last = np.searchsorted([t for t, _, _ in path], times) - 1
-    g = np.where(run.scene.static[:, None], 0.0, run.scene.gravity)
-    for k, (start, x, v) in enumerate(path[i] for i in last):
-        since = times[k] - start
-        np.testing.assert_allclose(answer.velocity[k], v + g * since, rtol=0, atol=tolerance)
-        np.testing.assert_allclose(
-            answer.position[k], x + v * since + g * since**2 / 2, rtol=0, atol=tolerance
-        )
 
 
 def contact(scene, position, i, j):
@@ -287,8 +217,11 @@ def test_an_offset_grows_between_static_disks_as_the_horizon_assumes():
     along = np.array([0.8, 0.6])
     start = np.array(scene.position)
     start[0] += 1e-7 * np.array([-0.6, 0.8])
-    moved = replace(scene, position=start)
-    offset = [abs(along[0] * x[0, 1] - along[1] * x[0, 0]) for _, x, _ in simulate(moved, 7.0)][1:]
+    engine, offset = EventEngine(replace(scene, position=start)), list[float]()
+    for at in truth.collisions.t[:8]:
+        engine.advance(at)
+        x = engine.motion_at(at)[0][0]
+        offset.append(abs(along[0] * x[1] - along[1] * x[0]))
     # q = 1 + 0.75 / 1.5; after a few bounces only the growing direction is left, while 1e-7 m is
     # still small.
     assert offset[7] / offset[6] == pytest.approx(1.5 + np.sqrt(1.25), rel=1e-3)

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from crosscheck2d.adapters.event_driven.events import EventEngine
 from crosscheck2d.scenarios.catalogue import scenario
 from crosscheck2d.scenarios.families.placing import box, lay_out, scatter
 from crosscheck2d.scenarios.model import Scenario, Scene, Thrust
@@ -18,7 +19,7 @@ from crosscheck2d.scenarios.truth.oracle import events as oracle_events
 from crosscheck2d.scenarios.truth.oracle.events import Path, trace
 from crosscheck2d.scenarios.truth.oracle.numbers import balls, mpfr
 from tests.scenarios.test_catalogue import smallest_gap
-from tests.scenarios.test_closed_forms import FLYING, simulate
+from tests.scenarios.test_closed_forms import FLYING
 
 RANDOM = ("asteroids", "falling_box", "gas_of_100")
 COUNTS = {"asteroids": 20, "falling_box": 980, "gas_of_100": 1974}
@@ -110,17 +111,13 @@ def test_the_random_scenes_are_answered_to_their_end(name: str, records: dict[st
     restitution=st.sampled_from([1.0, 0.9, 0.5]),
     gravity=st.sampled_from([0.0, -3]),
 )
-def test_it_finds_the_collisions_of_a_float64_simulation(
-    seed: int, restitution: float, gravity: float
-):
-    # what comes to rest stops the clock of the simulation
-    gravity = gravity if restitution > 0.5 else 0.0
+def test_it_finds_the_collisions_of_the_event_engine(seed: int, restitution: float, gravity: float):
     one = asked(sampled(seed, 4, restitution, gravity), 1.0)
-    found = states(one, computed(one)).collisions.t[:10]
-    path = simulate(one.scene, float(found[-1]) + 1e-9 if len(found) else 1.0)[1:]
+    found, engine = states(one, computed(one)).collisions.t[:10], EventEngine(one.scene)
+    engine.advance(float(found[-1]) + 1e-9 if len(found) else 1.0)
 
     # Ten collisions lose at most as many digits: 1e-16 times 10^6 or so.
-    np.testing.assert_allclose(found, [t for t, _, _ in path], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(found, engine.collisions[:, 0], rtol=0, atol=1e-9)
 
 
 def test_two_precisions_give_what_intervals_prove(records: dict[str, TruthRecord]):
