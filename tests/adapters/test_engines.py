@@ -31,7 +31,8 @@ from crosscheck2d.reference_impl.blocks import ADVANCE
 from crosscheck2d.reports.run.cells import Cell
 from crosscheck2d.reports.run.playing import play_cell
 from crosscheck2d.scenarios.catalogue import scenario as from_catalogue
-from crosscheck2d.scenarios.model import Scenario, Scene, Thrust
+from crosscheck2d.scenarios.families.placing import lay_out
+from crosscheck2d.scenarios.model import Scenario, Thrust
 from tests.adapters.broken_engines import NanAtStep7, RaisesInStep
 
 FLOAT32_ENGINES = [name for name, row in ENGINES.items() if row.rounding > 2.0**-53]
@@ -126,14 +127,7 @@ def test_an_engine_plays_friction_or_says_that_it_does_not(name):
 
 @pytest.mark.parametrize("name", ENGINES)
 def test_disks_do_not_see_each_other_across_the_edge_but_meet_after_it(name):
-    scene = Scene(
-        position=[[4.9, 0.0], [-4.2, 0.0]],
-        velocity=[[2.0, 0.0], [0.0, 0.0]],
-        radius=[0.25, 0.25],
-        mass=[1.0, 1.0],
-        restitution=1.0,
-        wrap=BOX,
-    )
+    scene = lay_out([[4.9, 0.0], [-4.2, 0.0]], [[2.0, 0.0], [0.0, 0.0]], wrap=BOX)
     apart = replace(scene, position=np.array([[4.9, 0.0], [-4.9, 0.0]]), velocity=np.zeros((2, 2)))
     still = played_or_skipped(name, asked(apart), 0.0125).trajectory
     assert len(still.collisions) == 0

@@ -17,7 +17,8 @@ from crosscheck2d.adapters.mechanisms.table import (
 )
 from crosscheck2d.adapters.play import play
 from crosscheck2d.scenarios.catalogue import scenario
-from crosscheck2d.scenarios.model import Scenario, Scene
+from crosscheck2d.scenarios.families.placing import lay_out
+from crosscheck2d.scenarios.model import Scenario
 from tests.reports.terminal.command_line import crosscheck
 
 FLOAT32 = 2.0**-24
@@ -28,15 +29,7 @@ OWN_DEFAULT = {"box2d:shipped": 0.2, "box2d_v3:shipped": 0.6}  # of who states n
 
 def thrown(e, mu):
     """A solid disk of 1 kg and 0.25 m that meets a floor at (5, -5) m/s, for half a second."""
-    scene = Scene(
-        position=[[0.0, 1.0]],
-        velocity=[[5.0, -5.0]],
-        radius=[0.25],
-        mass=[1.0],
-        restitution=e,
-        friction=mu,
-        walls=FLOOR,
-    )
+    scene = lay_out([[0.0, 1.0]], [[5.0, -5.0]], restitution=e, friction=mu, walls=FLOOR)
     return Scenario("thrown", "How does it leave?", "here", scene, 0.5, 0.25, (15, 240))
 
 

@@ -16,6 +16,7 @@ from crosscheck2d.adapters.play import play
 from crosscheck2d.adapters.reference import Reference
 from crosscheck2d.reference_impl import coulomb, exercise, ordered
 from crosscheck2d.scenarios.catalogue import scenario
+from crosscheck2d.scenarios.families.placing import lay_out
 from crosscheck2d.scenarios.model import Scene
 
 ROUNDING = 2.0**-53
@@ -42,15 +43,7 @@ def test_with_friction_0_it_is_the_exercise_to_the_bit(name):
 
 
 def thrown(e, mu):
-    return Scene(
-        position=[[-4.0, 1.0]],
-        velocity=[[5.0, -5.0]],
-        radius=[0.25],
-        mass=[1.0],
-        restitution=e,
-        friction=mu,
-        walls=FLOOR,
-    )
+    return lay_out([[-4.0, 1.0]], [[5.0, -5.0]], restitution=e, friction=mu, walls=FLOOR)
 
 
 @pytest.mark.parametrize("variant", [coulomb, ordered])
@@ -115,12 +108,10 @@ def energy(scene, state):
 
 
 def placed(mu, slope=0.0, speed=0.0, spin=0.0, e=0.0):
-    return Scene(
-        position=[[0.0, 0.25]],
-        velocity=[[speed, 0.0]],
+    return lay_out(
+        [[0.0, 0.25]],
+        [[speed, 0.0]],
         angular_velocity=[spin],
-        radius=[0.25],
-        mass=[1.0],
         restitution=e,
         friction=mu,
         gravity=[10 * sin(slope), -10 * cos(slope)],

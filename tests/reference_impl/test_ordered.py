@@ -12,7 +12,7 @@ from crosscheck2d.adapters.event_driven.events import EventEngine
 from crosscheck2d.adapters.reference import Reference
 from crosscheck2d.reference_impl import neighbours, ordered
 from crosscheck2d.scenarios.catalogue import scenario
-from crosscheck2d.scenarios.families.placing import box
+from crosscheck2d.scenarios.families.placing import box, lay_out
 from crosscheck2d.scenarios.model import Scenario, Scene
 from crosscheck2d.scenarios.truth.exact import computed
 from tests.adapters.event_driven.gases import boxed_asteroids
@@ -153,11 +153,9 @@ def test_the_neighbour_list_leaves_every_bit_as_it_is():
 
 
 def falling(height=1.0, e=0.5, gravity=-10.0):
-    return Scene(
-        position=[[0.0, 0.25 + height]],
-        velocity=[[0.0, 0.0]],
-        radius=[0.25],
-        mass=[2.0],
+    return lay_out(
+        [[0.0, 0.25 + height]],
+        mass=2.0,
         restitution=e,
         gravity=[0.0, gravity],
         walls=[[[-3.0, 0.0], [3.0, 0.0]]],
@@ -192,11 +190,10 @@ def test_a_heap_takes_few_collisions_a_step_and_neither_overlaps_nor_gains_energ
     # times it.
     rng = np.random.default_rng(seed)
     grid = np.stack(np.meshgrid(np.arange(6), np.arange(5)), -1).reshape(-1, 2)
-    scene = Scene(
-        position=0.6 + grid * 1.05 + rng.uniform(0, 0.02, (30, 2)),
-        velocity=rng.normal(size=(30, 2)),
-        radius=np.full(30, 0.5),
-        mass=np.ones(30),
+    scene = lay_out(
+        0.6 + grid * 1.05 + rng.uniform(0, 0.02, (30, 2)),
+        rng.normal(size=(30, 2)),
+        radius=0.5,
         restitution=0.5,
         gravity=[0.0, -10.0],
         walls=box([0.0, 0.0], [6.6, 20.0]),
@@ -236,10 +233,9 @@ def steps_of(scene, dt, steps, variant=ordered):
 
 def column(masses, e=0.0, gap=0.0, friction=0.0):
     n = len(masses)
-    return Scene(
-        position=np.stack([np.zeros(n), 0.5 + gap + np.arange(n) * (1 + gap)], axis=-1),
-        velocity=np.zeros((n, 2)),
-        radius=[0.5] * n,
+    return lay_out(
+        np.stack([np.zeros(n), 0.5 + gap + np.arange(n) * (1 + gap)], axis=-1),
+        radius=0.5,
         mass=masses,
         restitution=e,
         friction=friction,
@@ -344,11 +340,8 @@ def test_a_pile_whose_lowest_row_fills_the_box_gains_no_energy(seed):
     # bound. Of 48 such piles 20 threw a disk through the floor.
     k = np.arange(12)
     scatter = np.random.default_rng(seed).uniform(-0.1, 0.1, (12, 2))
-    scene = Scene(
-        position=np.stack([0.8 * (k % 3) - 0.8, 0.5 + 0.7 * (k // 3)], -1) + scatter,
-        velocity=np.zeros((12, 2)),
-        radius=np.full(12, 0.25),
-        mass=np.ones(12),
+    scene = lay_out(
+        np.stack([0.8 * (k % 3) - 0.8, 0.5 + 0.7 * (k // 3)], -1) + scatter,
         walls=box([-1.25, 0], [1.25, 8]),
         gravity=np.array([0.0, -10.0]),
         restitution=0.2,

@@ -228,14 +228,7 @@ def test_the_horizon_is_shorter_beside_a_disk_far_away_that_nothing_meets():
     walls = [[[-2, -2], [2, -2]], [[2, -2], [2, 2]], [[2, 2], [-2, 2]], [[-2, 2], [-2, -2]]]
 
     def followed(far: float, y: float = 0.0) -> float:
-        scene = Scene(
-            position=[*position, [far, y]],
-            velocity=[*velocity, [0.0, 0.0]],
-            radius=[0.3] * 7,
-            mass=[1] * 7,
-            walls=walls,
-            restitution=1,
-        )
+        scene = lay_out([*position, [far, y]], [*velocity, [0.0, 0.0]], radius=0.3, walls=walls)
         return computed(asked(scene, 10.0)).float64_horizon
 
     near, middle, far = map(followed, (3.0, 30.0, 300.0))

@@ -7,7 +7,7 @@ import numpy as np
 
 from crosscheck2d.adapters.event_driven.events import EventEngine
 from crosscheck2d.scenarios.families.exercise import HIGH, LOW, SHIP, SHIP_MASS, SHIP_RADIUS
-from crosscheck2d.scenarios.families.placing import box, scatter
+from crosscheck2d.scenarios.families.placing import box, lay_out, scatter
 from crosscheck2d.scenarios.model import Scene
 
 
@@ -24,13 +24,7 @@ def gas(n: int, packing: float, seed: int = 0) -> tuple[Scene, np.ndarray]:
     velocity = np.random.default_rng(seed).normal(size=(n, 2))
     velocity -= velocity.mean(axis=0)
     velocity *= np.sqrt(2 * (n - 1) / (velocity**2).sum())
-    scene = Scene(
-        position=np.stack([x, y], -1),
-        velocity=velocity,
-        radius=np.full(n, 0.5),
-        mass=np.ones(n),
-        restitution=1.0,
-    )
+    scene = lay_out(np.stack([x, y], -1), velocity, radius=0.5)
     return scene, np.array([[0.0, 0.0], [side, side]])
 
 

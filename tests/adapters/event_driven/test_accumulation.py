@@ -13,7 +13,7 @@ from crosscheck2d.adapters.event_driven import events
 from crosscheck2d.adapters.event_driven import loop as event_loop
 from crosscheck2d.adapters.event_driven.disks import GOES_ON, LEFT
 from crosscheck2d.adapters.event_driven.events import EventEngine
-from crosscheck2d.scenarios.families.placing import box
+from crosscheck2d.scenarios.families.placing import box, lay_out
 from crosscheck2d.scenarios.families.rows import counting_pi
 from crosscheck2d.scenarios.model import Scenario, Scene
 from crosscheck2d.scenarios.no_truth import NoTruth
@@ -166,14 +166,7 @@ def test_collisions_that_accumulate_are_refused_where_the_exact_answer_ends_too(
 
 
 def test_a_disk_driven_into_a_wall_by_another_is_refused():
-    scene = Scene(
-        position=[[0.25, 0.0], [1.2, 0.0]],
-        velocity=np.zeros((2, 2)),
-        radius=[0.25, 0.25],
-        mass=[1.0, 1.0],
-        restitution=0.6,
-        walls=[[[0.0, -5.0], [0.0, 5.0]]],
-    )
+    scene = lay_out([[0.25, 0.0], [1.2, 0.0]], restitution=0.6, walls=[[[0.0, -5.0], [0.0, 5.0]]])
     engine = EventEngine(scene)
     engine.accelerate(1, 0.0, np.array([-5.0, 0.0]))
     with pytest.raises(
@@ -222,11 +215,7 @@ def test_many_collisions_in_a_short_time_are_followed():
 
 
 def test_what_would_take_for_ever_is_refused_though_it_is_no_collision():
-    engine = EventEngine(
-        Scene(
-            position=[[0.0, 0.0]], velocity=[[0.0, 0.0]], radius=[0.25], mass=[1.0], restitution=1.0
-        )
-    )
+    engine = EventEngine(lay_out([[0.0, 0.0]]))
     engine.accelerate(0, 0.0, np.array([1e160, 0.0]))
     with pytest.raises(NoTruth, match="are too many to follow up to 1 s"):
         engine.advance(1.0)

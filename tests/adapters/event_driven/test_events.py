@@ -10,6 +10,7 @@ from crosscheck2d.adapters.event_driven.engine import EventDriven
 from crosscheck2d.adapters.event_driven.events import EventEngine
 from crosscheck2d.adapters.play import play
 from crosscheck2d.scenarios.catalogue import SCENARIOS, scenario
+from crosscheck2d.scenarios.families.placing import lay_out
 from crosscheck2d.scenarios.model import Scenario, Scene, Thrust
 from crosscheck2d.scenarios.no_truth import NoTruth
 from crosscheck2d.scenarios.truth.exact import OracleTruth
@@ -125,13 +126,8 @@ def test_touching_disks_that_part_are_allowed():
 def test_accumulation_is_refused_with_time_and_disk():
     # A ball above a static one at e = 0.5: from 1.4 m, over after 3 t1; the answer up to there is
     # given.
-    fall = Scene(
-        position=[[0, 1.6], [0, 0]],
-        velocity=np.zeros((2, 2)),
-        radius=[0.1, 0.1],
-        mass=[1.0, np.inf],
-        restitution=0.5,
-        gravity=[0, -9.81],
+    fall = lay_out(
+        [[0, 1.6], [0, 0]], radius=0.1, mass=[1.0, np.inf], restitution=0.5, gravity=[0, -9.81]
     )
     end = 3 * np.sqrt(2 * 1.4 / 9.81)
     said = r"the collisions of disk 0 on disk 1 accumulate at 1\.6027"
@@ -143,14 +139,7 @@ def test_accumulation_is_refused_with_time_and_disk():
 def test_the_wrap_is_an_event_and_a_reentry_on_top_of_a_disk_ends_the_answer():
     box_ = [[-5, -3], [5, 3]]
     for wait, free in ((-4.2, False), (-3.5, True)):
-        scene = Scene(
-            position=[[4.0, 0.0], [wait, 0.0]],
-            velocity=[[2.0, 0.0], [0.0, 0.0]],
-            radius=[0.5, 0.5],
-            mass=[1.0, 1.0],
-            restitution=1.0,
-            wrap=box_,
-        )
+        scene = lay_out([[4.0, 0.0], [wait, 0.0]], [[2.0, 0.0], [0.0, 0.0]], radius=0.5, wrap=box_)
         if free:
             engine, x, v = state_after(scene, 1.0)
             assert collisions_of(engine) == [(0.75, 0, 1)]

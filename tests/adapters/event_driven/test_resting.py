@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from crosscheck2d.adapters.event_driven import events
 from crosscheck2d.adapters.event_driven.events import EventEngine
-from crosscheck2d.scenarios.families.placing import box, scatter
+from crosscheck2d.scenarios.families.placing import box, lay_out, scatter
 from crosscheck2d.scenarios.model import Scene
 from crosscheck2d.scenarios.no_truth import NoTruth
 from crosscheck2d.scenarios.truth.closed_forms import bouncing
@@ -303,14 +303,7 @@ def test_a_tiny_wall_has_a_face_and_two_ends(length, share, angle):
     end = start + length * way
     u = (end - start) / np.hypot(*(end - start))  # rounding turns so short a wall by up to 1e-7
     n = np.array([-u[1], u[0]])
-    scene = Scene(
-        position=[start + share * (end - start) + 1.25 * n],
-        velocity=[-n],
-        radius=[0.25],
-        mass=[1.0],
-        restitution=1.0,
-        walls=[[start, end]],
-    )
+    scene = lay_out([start + share * (end - start) + 1.25 * n], [-n], walls=[[start, end]])
     _, v = after(scene, 2.0)
 
     aside = (scene.position[0] - start) @ u
@@ -331,13 +324,8 @@ def test_at_restitution_zero_a_disk_slides_past_both_ends_of_a_wall():
         walls = np.array([[place - half * np.array(way), place + half * np.array(way)]])
         u = (walls[0, 1] - walls[0, 0]) / np.hypot(*(walls[0, 1] - walls[0, 0]))
         n = np.array([-u[1], u[0]])
-        scene = Scene(
-            position=[place + 0.75 * n - speed / 2 * u],
-            velocity=[speed * u - n],
-            radius=[0.25],
-            mass=[1.0],
-            restitution=0.0,
-            walls=walls,
+        scene = lay_out(
+            [place + 0.75 * n - speed / 2 * u], [speed * u - n], restitution=0.0, walls=walls
         )
         engine = EventEngine(scene)
         engine.advance(3.0)
@@ -353,11 +341,9 @@ def test_a_turned_floor_of_two_walls_is_a_floor():
         angle, joint = draw.uniform(0, 2 * np.pi), draw.uniform(-0.5, 0.8)
         turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
         walls = np.array([[[-4, 0], [joint, 0]], [[joint, 0], [4, 0]]]) @ turn.T + 0.7
-        two = Scene(
-            position=[turn @ [-1, 0.25 + draw.uniform(0.01, 0.1)] + 0.7],
-            velocity=[turn @ [draw.choice([0.5, 1.0, 2.0, 4.0]), 0]],
-            radius=[0.25],
-            mass=[1.0],
+        two = lay_out(
+            [turn @ [-1, 0.25 + draw.uniform(0.01, 0.1)] + 0.7],
+            [turn @ [draw.choice([0.5, 1.0, 2.0, 4.0]), 0]],
             restitution=draw.choice([0.0, 0.5, 0.9]),
             friction=draw.choice([0.0, 0.3]),
             walls=walls,
