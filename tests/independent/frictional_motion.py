@@ -7,6 +7,7 @@ used. `sliding` integrates a disk on an incline in tiny steps of impulses along 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -33,27 +34,39 @@ def first_fall(gap: Array) -> float:
     return float(min(times[(times > -1e-11) & falling], default=np.inf))
 
 
-def next_contact(scene: Scene, x: Array, v: Array) -> tuple[float, int, int, Array]:
-    """s until the next contact, its disk, the other (-1: a wall), the direction to that then."""
+def next_contact(
+    scene: Scene, x: Array, v: Array, images: Sequence[Array] = (np.zeros(2),)
+) -> tuple[float, int, int, Array]:
+    """s until the next contact, its disk, the other one or wall w as -1 - w, the direction to that
+    then. images (2,) m: how far from a disk the images of it are that others meet."""
     found = [(np.inf, 0, 0, np.zeros(2))]
     g = np.where(scene.static[:, None], 0.0, scene.gravity)
     for i in np.flatnonzero(~scene.static):
-        bodies = [(j, x[j], v[j], g[j], scene.radius[j]) for j in range(scene.n) if j != i]
-        ends = [(-1, end, np.zeros(2), np.zeros(2), 0.0) for end in scene.walls.reshape(-1, 2)]
+        bodies = [
+            (j, x[j] + shift, v[j], g[j], scene.radius[j])
+            for j in range(scene.n)
+            for shift in images
+            if j != i
+        ]
+        ends = [
+            (-1 - w, end, np.zeros(2), np.zeros(2), 0.0)
+            for w, wall in enumerate(scene.walls)
+            for end in wall
+        ]
         for j, place, speed, acceleration, radius in [*bodies, *ends]:
             way = np.array([(acceleration - g[i]) / 2, speed - v[i], place - x[i]])
             gap = sum(np.convolve(way[:, axis], way[:, axis]) for axis in (0, 1))
             gap[-1] -= (radius + scene.radius[i]) ** 2
             if (t := first_fall(gap)) < np.inf:
                 found.append((t, i, j, (way[0] * t + way[1]) * t + way[2]))
-        for start, end in scene.walls:
+        for w, (start, end) in enumerate(scene.walls):
             along = (end - start) / np.hypot(*(end - start))
             for normal in (np.array([-along[1], along[0]]), np.array([along[1], -along[0]])):
                 height = [g[i] @ normal / 2, v[i] @ normal, (x[i] - start) @ normal]
                 t = first_fall(np.array(height) - [0, 0, scene.radius[i]])
                 foot = (x[i] + (v[i] + g[i] * t / 2) * t - start) @ along if t < np.inf else -1
                 if 0 <= foot <= np.hypot(*(end - start)):
-                    found.append((t, i, -1, -normal))
+                    found.append((t, i, -1 - w, -normal))
     return min(found, key=lambda each: each[0])
 
 

@@ -1,4 +1,6 @@
-"""The event engine against a second algorithm, and whether that would notice a bug."""
+"""The event engine against a second algorithm, that of `frictional_motion`: all contacts as
+polynomials, all roots by numpy, nothing kept from one event to the next; and whether that would
+notice a bug."""
 
 from __future__ import annotations
 
@@ -17,84 +19,27 @@ from crosscheck2d.scenarios.families.placing import box, scatter
 from crosscheck2d.scenarios.model import Scene
 from crosscheck2d.scenarios.no_truth import NoTruth
 from tests.adapters.event_driven.gases import collisions_of
-
-# A second algorithm: all contacts as polynomials, all roots by numpy, nothing kept from one event
-# to the next.
-
-
-def first_fall(gap):
-    """First t >= 0 at which a polynomial (highest power first) comes down through 0."""
-    gap = np.trim_zeros(gap, "f")
-    roots = np.roots(gap) if len(gap) > 1 else np.zeros(0)
-    times = roots[np.abs(roots.imag) < 1e-12].real
-    falling = np.polyval(np.polyder(gap), times) < 0
-    return min(times[(times > -1e-12) & falling], default=np.inf)
-
-
-def contacts(scene, x, v, a, images):
-    """All contacts ahead: (time, disk, other or -1 - wall, normal to it at the contact)."""
-    for i in range(scene.n):
-        points = [
-            (scene.radius[i], -1 - w, end, 0, 0)
-            for w, wall in enumerate(scene.walls)
-            for end in wall
-        ]
-        others = [
-            (scene.radius[i] + scene.radius[j], j, x[j] + shift, v[j], a[j])
-            for j in range(i + 1, scene.n)
-            for shift in images
-        ]
-        for reach, j, place, speed, acceleration in [*points, *others]:
-            path = np.array([(a[i] - acceleration) / 2, v[i] - speed, x[i] - place])
-            gap = sum(np.convolve(path[:, axis], path[:, axis]) for axis in range(2)) - [
-                0,
-                0,
-                0,
-                0,
-                reach**2,
-            ]
-            if (t := first_fall(gap)) < np.inf:
-                yield t, i, j, np.array([np.polyval(path[:, axis], t) for axis in range(2)])
-        for w, (start, end) in enumerate(scene.walls):
-            along = (end - start) / np.hypot(*(end - start))
-            for normal in (np.array([-along[1], along[0]]), np.array([along[1], -along[0]])):
-                t = first_fall(
-                    [a[i] @ normal / 2, v[i] @ normal, (x[i] - start) @ normal - scene.radius[i]]
-                )
-                if t < np.inf and 0 < (
-                    x[i] + v[i] * t + a[i] * t * t / 2 - start
-                ) @ along < np.hypot(*(end - start)):
-                    yield t, i, -1 - w, normal
+from tests.independent.frictional_motion import next_contact, resolve
 
 
 def brute_force(scene, side, count):
     """Up to `count` collisions as (t, i, j) within 5 s, and when it stopped and where; side: of the
     torus, or 0."""
-    x, v, w = scene.position.copy(), scene.velocity.copy(), 1 / scene.mass
+    x, v, spin = scene.position.copy(), scene.velocity.copy(), np.zeros(scene.n)
     a = np.where(scene.static[:, None], 0.0, scene.gravity)
-    images = (
-        [np.array([k, m]) * side for k in (-1, 0, 1) for m in (-1, 0, 1)] if side else [np.zeros(2)]
-    )
+    images = side * np.array([[k, m] for k in (-1, 0, 1) for m in (-1, 0, 1)]) if side else [[0, 0]]
     now, collisions = 0.0, []
     while len(collisions) < count:
         if side:
             x = np.mod(x, side)
-        t, i, j, normal = min(
-            contacts(scene, x, v, a, images), key=lambda c: c[0], default=(np.inf, 0, 0, None)
-        )
+        t, i, j, way = next_contact(scene, x, v, images)
         t = min(t, 0.2 if side else 10.0)  # in 0.2 s nobody passes the next image
         if now + t > 5:
             break
         x, v, now = x + v * t + a * t * t / 2, v + a * t, now + t
-        if t in (0.2, 10.0):
-            continue
-        normal = normal / np.hypot(*normal)
-        speed, weight = (v[i] - v[j], w[i] + w[j]) if j >= 0 else (v[i], w[i])
-        kick = (1 + scene.restitution) * (speed @ normal) / weight * normal
-        v[i] -= w[i] * kick
-        if j >= 0:
-            v[j] += w[j] * kick
-        collisions.append((now, i, j))
+        if t not in (0.2, 10.0):
+            resolve(scene, i, j, way, v, spin)
+            collisions.append((now, *((i, j) if j < 0 or i < j else (j, i))))
     return collisions, now, x
 
 
