@@ -103,7 +103,7 @@ ENGINES: dict[str, EngineRow] = {
     ),
     "reference:ordered": _Reference(
         partial(_reference, "ordered"),
-        "hand-written: exact flight, time-of-impact ordering, friction; 925 lines, no projection",
+        "hand-written: exact flight, time-of-impact ordering, friction; 905 lines, no projection",
         0.5,
         dash=(9, 3, 2, 3),
         shape="hourglass",
