@@ -36,6 +36,7 @@ ROUNDING = 1e-14
 # which of the cells around a disk to search: all, or only those beyond the edge it has just crossed
 ALL = -1
 
+Pair = tuple[float, float]
 Quartic = tuple[float, float, float, float, float]
 
 
@@ -101,7 +102,7 @@ def wall_time(walls: Walls, a: Any, w: int, part: int, until: float) -> float:
             return inf
         if part == 2:
             dx, dy = dx - length * ux, dy - length * uy
-        return meeting(dx, dy, a.vx, a.vy, a.ax, a.ay, a.radius, noise, until)
+        return meeting((dx, dy), (a.vx, a.vy), (a.ax, a.ay), a.radius, noise, until)
     first = inf
     for side in (1.0, -1.0):
         gap, v, p = side * height - a.radius, side * speed, side * acceleration
@@ -135,30 +136,21 @@ def end_time(walls: Walls, a: Any) -> float:
 
 
 @kernel
-def meeting(
-    dx: float,
-    dy: float,
-    ux: float,
-    uy: float,
-    ax: float,
-    ay: float,
-    reach: float,
-    noise: float,
-    until: float,
-) -> float:
+def meeting(d: Pair, u: Pair, a: Pair, reach: float, noise: float, until: float) -> float:
     """When two disks meet, from position, velocity and acceleration of one relative to the other.
 
     noise: the rounding error of their closing speed if they have just collided, else 0.
     """
+    (dx, dy), (ux, uy) = d, u
     gap, closing, speed2 = dx * dx + dy * dy - reach * reach, dx * ux + dy * uy, ux * ux + uy * uy
     if noise > 0.0:
         if abs(gap) < ROUNDING * reach * reach:
             gap = min(gap, 0.0)
         if abs(closing) < reach * noise:
             closing = 0.0
-    if ax == 0.0 and ay == 0.0:
+    if a[0] == 0.0 and a[1] == 0.0:
         return disk_time(gap, closing, speed2)
-    return curved_time(dx, dy, ux, uy, ax, ay, gap, closing, until)
+    return curved_time(d, u, a, gap, closing, until)
 
 
 @inlined
@@ -227,8 +219,8 @@ def find_pair(arena: Arena, scenery: Scenery, i: int, beyond: int) -> None:
         reach = radius + b.radius
         if len(scenery) and arena.rules.mixed and (b.ax != a.ax or b.ay != a.ay):
             noise_of_pair = noise if last == j and b.last == i else 0.0
-            until = min(best, a.own_time - now)
-            t = meeting(dx, dy, ux, uy, b.ax - a.ax, b.ay - a.ay, reach, noise_of_pair, until)
+            curve, until = (b.ax - a.ax, b.ay - a.ay), min(best, a.own_time - now)
+            t = meeting((dx, dy), (ux, uy), curve, reach, noise_of_pair, until)
             if t < best:
                 best, who = t, np.int64(j)
         else:
@@ -276,22 +268,13 @@ def disk_time(gap: float, closing: float, speed2: float) -> float:
 
 
 @kernel
-def curved_time(
-    dx: float,
-    dy: float,
-    ux: float,
-    uy: float,
-    ax: float,
-    ay: float,
-    gap: float,
-    closing: float,
-    until: float,
-) -> float:
+def curved_time(d: Pair, u: Pair, a: Pair, gap: float, closing: float, until: float) -> float:
     """Contact of two disks with different accelerations up to `until` s: the first down-crossing of
     a quartic.
 
     d, u, a: position, velocity and acceleration of one relative to the other; a != 0.
     """
+    (dx, dy), (ux, uy), (ax, ay) = d, u, a
     if gap <= 0.0 and closing < 0.0:
         return 0.0
     f = (

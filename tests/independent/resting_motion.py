@@ -2,7 +2,7 @@
 friction, and a column of balls above a floor.
 
 In 400 bits, bounce by bounce, until what is left is below 1e-30; then the ball slides and rolls by
-the formulas of any textbook, and the column lies. `stepped` is the ball again, in small steps.
+the formulas of any textbook, and the column lies.
 """
 
 from __future__ import annotations
@@ -105,31 +105,6 @@ def lying(ball: Ball, pull: mpfr, most: mpfr, ratio: mpfr, r: mpfr) -> list[Ball
     held = -pull / (1 + ratio)
     force = clamp(held, most)
     return [*legs, ball._replace(a=pull + force, rate=ratio * force / r)]
-
-
-def stepped(scene: Scene, until: float, steps: int) -> tuple[float, float, float]:
-    """Way along the wall m, its speed m/s, and spin rad/s of the same ball after `until` s: in each
-    step gravity, then one impulse if it is at the wall and approaches, then the flight."""
-    start, end = scene.walls[0]
-    along = (end - start) / np.hypot(*(end - start))
-    up = np.array([-along[1], along[0]])
-    way, gap = (scene.position[0] - (start + end) / 2) @ along, (scene.position[0] - start) @ up
-    v, u, spin = scene.velocity[0] @ along, scene.velocity[0] @ up, scene.angular_velocity[0]
-    r, h, gap = scene.radius[0], until / steps, gap - scene.radius[0]
-    ratio, pull, fall = (
-        scene.mass[0] * r * r / scene.inertia[0],
-        scene.gravity @ along,
-        scene.gravity @ up,
-    )
-    for _ in range(steps):
-        v, u = v + pull * h, u + fall * h
-        if gap <= 0 and u < 0:
-            bounces = scene.restitution if u < 4 * fall * h else 0.0
-            most = scene.friction * (1 + bounces) * -u
-            kick = min(max(-(v + r * spin) / (1 + ratio), -most), most)
-            u, v, spin = -bounces * u, v + kick, spin + ratio * kick / r
-        way, gap = way + v * h, gap + u * h
-    return float(way), float(v), float(spin)
 
 
 Leg = tuple[mpfr, list[mpfr], list[mpfr], list[bool]]

@@ -7,11 +7,10 @@ import pytest
 
 from crosscheck2d.scenarios.model import Scenario, Scene
 from crosscheck2d.scenarios.truth.exact import computed
-from tests.independent.resting_motion import ball_on_slope, column, stepped
+from tests.independent.resting_motion import ball_on_slope, column
 
 pytestmark = pytest.mark.independent
 MANY = pytest.param(450, marks=pytest.mark.long)
-STEP = 1e-4  # s
 # in the reason of an answer that ends
 UNKNOWN = ("order of", "orders than", "do not end", "used up their digits")
 
@@ -80,23 +79,6 @@ def test_balls_on_slopes_end_as_in_the_plain_motion(count: int):
         # The ends of the wall, at 1 km, are rounded to 1e-13 m.
         height = (position[:, 0] - start) @ up - scene.radius[0]
         np.testing.assert_allclose(height, gap, rtol=0, atol=1e-11)
-
-
-@pytest.mark.parametrize("count", [20, pytest.param(50, marks=pytest.mark.long)])
-def test_balls_on_slopes_in_small_steps_are_as_near_as_their_step(count: int):
-    # c dt, c = 10 (1 + e) / (1 - e) (v + g T) m/s: each bounce is late by up to a step, at (1 + e)
-    # of its speed, and a step of gravity is g T dt / 2.
-    for seed in range(count):
-        scene, duration = slope_scene(seed)
-        one = asked(scene, duration)
-        (position, velocity), (_, spin) = computed(one).motion(scene, [], np.array([duration]))
-        way, v, w = stepped(scene, duration, round(duration / STEP))
-        along = (scene.walls[0, 1] - scene.walls[0, 0]) / 2000
-        e, g = scene.restitution, -scene.gravity[1]
-        c = 10 * (1 + e) / (1 - e) * (np.hypot(*scene.velocity[0]) + g * duration)
-        assert abs(position[0, 0] @ along - way) < c * STEP, seed
-        assert abs(velocity[0, 0] @ along - v) < c * STEP / duration * 4 + 4 * g * STEP, seed
-        assert abs(spin[0, 0] - w) * scene.radius[0] < c * STEP * 4 + 12 * g * STEP, seed
 
 
 @pytest.mark.parametrize("count", [20, pytest.param(200, marks=pytest.mark.long)])

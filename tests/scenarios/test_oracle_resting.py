@@ -179,60 +179,6 @@ def test_a_collision_on_a_resting_disk_is_the_limit_of_small_gaps(
     np.testing.assert_allclose(limit.velocity[-1, :, 1], [lower, upper], rtol=0, atol=1e-15)
 
 
-def hopping(scene: Scene, until: float, least: float) -> np.ndarray:
-    """(n, 2) m at `until` s of a float64 simulation in which nothing rests: it hops on at `least`
-    m/s instead.
-
-    All pairs, floor at y = 0 only, gravity; times of contact by bisection on a grid finer than any
-    pass.
-    """
-    x, v, t = np.array(scene.position), np.array(scene.velocity), 0.0
-    g, step = scene.gravity, 2e-4
-    a, b = np.triu_indices(scene.n, 1)
-    while t < until:
-        h = min(step, until - t)
-        ahead = x + v * h + g * h * h / 2
-        v = v + g * h
-        x, t = ahead, t + h
-        for i in np.flatnonzero((x[:, 1] < scene.radius) & (v[:, 1] < 0)):
-            x[i, 1] = scene.radius[i]
-            v[i, 1] = max(-scene.restitution * v[i, 1], least)
-        for i, j in zip(a, b):
-            n = x[j] - x[i]
-            d = np.hypot(*n)
-            closing = (v[j] - v[i]) @ n / d
-            if d < scene.radius[i] + scene.radius[j] and closing < 0:
-                kick = (
-                    (1 + scene.restitution) * closing / d / (1 / scene.mass[i] + 1 / scene.mass[j])
-                )
-                v[i] += kick / scene.mass[i] * n
-                v[j] -= kick / scene.mass[j] * n
-    return x
-
-
-def test_a_simulation_that_never_rests_comes_near_as_its_hops_shrink():
-    scene = falling(
-        [[0, 0.4], [-0.2, 2.6]],
-        [[0.5, 0], [0.4, 0]],
-        radius=[0.3, 0.25],
-        mass=[2, 1],
-        restitution=0.6,
-    )
-    one = asked(scene, 1.0)
-    record = computed(one)
-    truth = states(one, record)
-    assert [i for _, i, _ in rests(record)][:1] == [0]
-    assert truth.collisions.t[truth.collisions.j == 1].min() > rests(record)[0][0]
-    errors = [
-        np.abs(hopping(scene, 1.0, least) - truth.position[-1]).max() for least in (0.05, 0.01)
-    ]
-
-    # Late by a step of 2e-4 s at 5 m/s is 1 mm; the larger hops lift the lower disk by up to 0.1
-    # mm, turning the collision.
-    assert errors[1] < 5e-3
-    assert errors[1] <= errors[0] + 1e-3
-
-
 @pytest.mark.slow
 @given(seed=st.integers(0, 10**6), restitution=st.sampled_from([0.3, 0.5, 0.7]))
 @settings(max_examples=8, deadline=None)
