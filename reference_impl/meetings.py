@@ -49,7 +49,7 @@ class Accelerations(NamedTuple):
     strongest: float  # m/s2, of the steady ones
 
 
-class Motion(NamedTuple):
+class System(NamedTuple):
     """What moves, where, and how."""
 
     disks: Disks
@@ -85,13 +85,13 @@ def bodies(near: NeighbourList, row: int) -> tuple[int, int]:
 
 
 @internal
-def meeting_time(motion: Motion, near: NeighbourList, i: int, j: int, now: float) -> float:
+def meeting_time(system: System, near: NeighbourList, i: int, j: int, now: float) -> float:
     """When disk i meets disk, wall or edge j from `now` on, or inf."""
     if j == EDGE:
-        return edge_time(motion, i, now)
+        return edge_time(system, i, now)
     if j < 0:
-        return wall_time(motion, near, i, -1 - j, now)
-    return pair_time(motion, near, i, j, now)
+        return wall_time(system, near, i, -1 - j, now)
+    return pair_time(system, near, i, j, now)
 
 
 @kernel
@@ -103,7 +103,7 @@ def add_meeting(agenda: Agenda, row: int, s: float) -> None:
 
 
 @kernel
-def list_meetings(motion: Motion, near: NeighbourList, agenda: Agenda, now: float) -> None:
+def list_meetings(system: System, near: NeighbourList, agenda: Agenda, now: float) -> None:
     """Fill the agenda with all meetings from `now` on."""
     pairs, walls = near.found[PAIRS], near.found[WALLS]
     for c in range(agenda.length[CHANGED]):
@@ -111,12 +111,12 @@ def list_meetings(motion: Motion, near: NeighbourList, agenda: Agenda, now: floa
     agenda.length[DUE] = agenda.length[CHANGED] = 0
     for p in range(pairs):
         i, j = int(near.first[p]), int(near.second[p])
-        add_meeting(agenda, p, pair_time(motion, near, i, j, now))
+        add_meeting(agenda, p, pair_time(system, near, i, j, now))
     for b in range(walls):
-        s = wall_time(motion, near, int(near.disk[b]), int(near.wall[b]), now)
+        s = wall_time(system, near, int(near.disk[b]), int(near.wall[b]), now)
         add_meeting(agenda, pairs + b, s)
     for e in range(near.found[EDGES]):
-        add_meeting(agenda, pairs + walls + e, edge_time(motion, int(near.edge[e]), now))
+        add_meeting(agenda, pairs + walls + e, edge_time(system, int(near.edge[e]), now))
 
 
 @kernel
@@ -142,25 +142,25 @@ def index_rows(near: NeighbourList, agenda: Agenda) -> None:
 
 
 @kernel
-def way_in_step(motion: Motion, i: int) -> float:
+def way_in_step(system: System, i: int) -> float:
     """m: disk i gets no farther in a step."""
-    x, v, a = motion.disks.position, motion.disks.velocity, motion.acceleration.now
+    x, v, a = system.disks.position, system.disks.velocity, system.acceleration.now
     speed = sqrt(v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1])
-    strength, dt = sqrt(a[i, 0] * a[i, 0] + a[i, 1] * a[i, 1]), abs(motion.dt)
+    strength, dt = sqrt(a[i, 0] * a[i, 0] + a[i, 1] * a[i, 1]), abs(system.dt)
     return (speed + strength * dt) * dt + ROUNDING * max(abs(x[i, 0]), abs(x[i, 1]))
 
 
 @kernel
-def mark_changed(motion: Motion, near: NeighbourList, agenda: Agenda, d: int) -> None:
+def mark_changed(system: System, near: NeighbourList, agenda: Agenda, d: int) -> None:
     """Disk d goes another way from now on."""
-    account_for(near, motion.disks.position, d, way_in_step(motion, d))
+    account_for(near, system.disks.position, d, way_in_step(system, d))
     if not agenda.stale[d]:
         agenda.stale[d], agenda.changed[agenda.length[CHANGED]] = True, d
         agenda.length[CHANGED] += 1
 
 
 @kernel
-def update_meetings(motion: Motion, near: NeighbourList, agenda: Agenda, now: float) -> None:
+def update_meetings(system: System, near: NeighbourList, agenda: Agenda, now: float) -> None:
     """Renew the meetings from `now` on of the disks that go another way."""
     stale, keep = agenda.stale, 0
     if agenda.length[CHANGED] == 0:
@@ -180,23 +180,23 @@ def update_meetings(motion: Motion, near: NeighbourList, agenda: Agenda, now: fl
             i, j = bodies(near, row)
             partner = j if i == d else i
             if not (0 <= partner < EDGE and stale[partner]):  # whose turn comes later
-                add_meeting(agenda, row, meeting_time(motion, near, i, j, now))
+                add_meeting(agenda, row, meeting_time(system, near, i, j, now))
         stale[d] = False
     agenda.length[CHANGED] = 0
 
 
 @kernel
-def first_meeting(motion: Motion, near: NeighbourList, agenda: Agenda, now: float):
+def first_meeting(system: System, near: NeighbourList, agenda: Agenda, now: float):
     """(s, i, j) of the first meeting from `now` on: of two disks, of a disk and wall j = -1 - w, or
     the edge. Of meetings at the same instant, that of the least i; of a disk, before a wall."""
     changed = agenda.length[CHANGED] > 0
-    update_meetings(motion, near, agenda, now)
+    update_meetings(system, near, agenda, now)
     while True:
         soon = inf
         for c in range(agenda.length[DUE]):
             soon = min(soon, agenda.time[c])
         first, least = (inf, NOBODY, NOBODY), 0
-        soon += SAME * motion.dt
+        soon += SAME * system.dt
         if soon == inf:
             return first
         for c in range(agenda.length[DUE]):
@@ -205,7 +205,7 @@ def first_meeting(motion: Motion, near: NeighbourList, agenda: Agenda, now: floa
                 i, j = bodies(near, row)
                 s = agenda.time[c]
                 if changed:
-                    s = meeting_time(motion, near, i, j, now)
+                    s = meeting_time(system, near, i, j, now)
                     agenda.time[c] = s
                 if s < first[0] or (s == first[0] < inf and (i, row) < (first[1], least)):
                     first, least = (s, i, j), row
@@ -214,15 +214,15 @@ def first_meeting(motion: Motion, near: NeighbourList, agenda: Agenda, now: floa
 
 
 @kernel
-def first_of_all_pairs(motion: Motion, near: NeighbourList, now: float):
+def first_of_all_pairs(system: System, near: NeighbourList, now: float):
     """As `first_meeting`, where the list does not hold: of all pairs."""
-    first, n = (inf, NOBODY, NOBODY), len(motion.disks.radius)
+    first, n = (inf, NOBODY, NOBODY), len(system.disks.radius)
     for i in range(n):
         for j in range(i + 1, n):
-            first = sooner(first, meeting_time(motion, near, i, j, now), i, j)
-        for w in range(len(motion.world.walls)):
-            first = sooner(first, wall_time(motion, near, i, w, now), i, -1 - w)
-        first = sooner(first, edge_time(motion, i, now), i, EDGE)
+            first = sooner(first, meeting_time(system, near, i, j, now), i, j)
+        for w in range(len(system.world.walls)):
+            first = sooner(first, wall_time(system, near, i, w, now), i, -1 - w)
+        first = sooner(first, edge_time(system, i, now), i, EDGE)
     return first
 
 
@@ -235,37 +235,37 @@ def sooner(first, s: float, i: int, j: int):
 
 
 @kernel
-def pair_time(motion: Motion, near: NeighbourList, i: int, j: int, now: float) -> float:
+def pair_time(system: System, near: NeighbourList, i: int, j: int, now: float) -> float:
     """When two disks meet from `now` on, or inf."""
-    x, radius, mass = motion.disks.position, motion.disks.radius, motion.disks.mass
-    held = motion.acceleration.held
+    x, radius, mass = system.disks.position, system.disks.radius, system.disks.mass
+    held = system.acceleration.held
     # Two that met within the step are no farther apart at its end than both ways: also those that
     # have passed through each other.
     dx, dy = x[i, 0] - x[j, 0], x[i, 1] - x[j, 1]
     reach = radius[i] + radius[j] + 2.0 * near.length[STRIDE]
     if dx * dx + dy * dy < reach * reach and not (mass[i] == inf and mass[j] == inf):
         level = min(held[i if mass[i] != inf else j], held[j if mass[j] != inf else i])
-        return meeting(path_of(motion, i, j), now, LEEWAY[level])
+        return meeting(path_of(system, i, j), now, LEEWAY[level])
     return inf
 
 
 @kernel
-def wall_time(motion: Motion, near: NeighbourList, i: int, w: int, now: float) -> float:
+def wall_time(system: System, near: NeighbourList, i: int, w: int, now: float) -> float:
     """When a disk meets a wall from `now` on, or inf."""
-    disks, walls = motion.disks, motion.world.walls
+    disks, walls = system.disks, system.world.walls
     x, reach = disks.position, disks.radius[i] + near.length[STRIDE]
     left, right = min(walls[w, 0, 0], walls[w, 1, 0]), max(walls[w, 0, 0], walls[w, 1, 0])
     low, high = min(walls[w, 0, 1], walls[w, 1, 1]), max(walls[w, 0, 1], walls[w, 1, 1])
     beside = left - reach < x[i, 0] < right + reach and low - reach < x[i, 1] < high + reach
     if beside and disks.mass[i] != inf:
-        return meeting(path_of(motion, i, -1 - w), now, LEEWAY[motion.acceleration.held[i]])
+        return meeting(path_of(system, i, -1 - w), now, LEEWAY[system.acceleration.held[i]])
     return inf
 
 
 @kernel
-def edge_time(motion: Motion, i: int, now: float) -> float:
+def edge_time(system: System, i: int, now: float) -> float:
     """When the centre of a disk leaves the box from `now` on, or inf."""
-    disks, world = motion.disks, motion.world
+    disks, world = system.disks, system.world
     first, x = inf, disks.position
     if disks.mass[i] == inf:
         return inf
@@ -277,11 +277,11 @@ def edge_time(motion: Motion, i: int, now: float) -> float:
 
 
 @kernel
-def path_of(motion: Motion, i: int, j: int):
+def path_of(system: System, i: int, j: int):
     """How disk i moves as seen from disk j, or from the start of wall w = -1 - j: place, velocity,
     acceleration; the wall, which a disk has without length; and the reach."""
-    disks, walls, w = motion.disks, motion.world.walls, -1 - j
-    x, v, a = disks.position, disks.velocity, motion.acceleration.now
+    disks, walls, w = system.disks, system.world.walls, -1 - j
+    x, v, a = disks.position, disks.velocity, system.acceleration.now
     if j >= 0:
         px, py, pu, pv = x[i, 0] - x[j, 0], x[i, 1] - x[j, 1], v[i, 0] - v[j, 0], v[i, 1] - v[j, 1]
         pa, pb = a[i, 0] - a[j, 0], a[i, 1] - a[j, 1]

@@ -31,7 +31,7 @@ from .meetings import (
     NOBODY,
     Accelerations,
     Agenda,
-    Motion,
+    System,
     contact,
     empty_agenda,
     first_meeting,
@@ -72,20 +72,20 @@ def advance(disks: Disks, world: World, dt: float, count: int) -> list:
     w as j = -1 - w."""
     collisions = [(0, 0, 0, 0.0) for _ in range(0)]  # empty, but numba must know what it will hold
     pushed = [(0, 0, 0, 0.0) for _ in range(0)]  # (i, j, row of the collision, force in N)
-    motion, k = Motion(disks, world, accelerations_of(disks, world), dt), 0
+    system, k = System(disks, world, accelerations_of(disks, world), dt), 0
     near = empty_list(disks.radius, len(world.walls))
     agenda = empty_agenda(near)
     while True:
-        k = fly_until_meeting(motion, near, agenda, k, count)
+        k = fly_until_meeting(system, near, agenda, k, count)
         if k == count:
             break
         if used_up(near):
-            find_near(motion, near, agenda, -dt, count - k)
+            find_near(system, near, agenda, -dt, count - k)
         if agenda.length[DUE] > 0 or not holds(near):
-            resolve(motion, near, agenda, k, count, collisions, pushed)
+            resolve(system, near, agenda, k, count, collisions, pushed)
         k += 1
     if world.friction == 0.0:
-        turn(motion, count)
+        turn(system, count)
     return collisions
 
 
@@ -107,20 +107,20 @@ def accelerations_of(disks: Disks, world: World) -> Accelerations:
 
 @kernel
 def fly_until_meeting(
-    motion: Motion, near: NeighbourList, agenda: Agenda, k: int, count: int
+    system: System, near: NeighbourList, agenda: Agenda, k: int, count: int
 ) -> int:
     """Take steps from step k on until one in which two meet or the list is used up: in that one all
     have flown, and nothing else was done. Returns it; the agenda has its meetings, unless the list
     is used up."""
-    dt = motion.dt
+    dt = system.dt
     while k < count:
-        fly(motion)
-        if motion.world.friction > 0.0:
-            turn(motion, 1)
-        take_step(near, motion.acceleration.strongest * dt * dt)
+        fly(system)
+        if system.world.friction > 0.0:
+            turn(system, 1)
+        take_step(near, system.acceleration.strongest * dt * dt)
         if used_up(near):
             break
-        list_meetings(motion, near, agenda, -dt)
+        list_meetings(system, near, agenda, -dt)
         if agenda.length[DUE] > 0:
             break
         k += 1
@@ -128,13 +128,13 @@ def fly_until_meeting(
 
 
 @kernel
-def fly(motion: Motion) -> None:
+def fly(system: System) -> None:
     """x + v dt + a dt2 / 2 and v + a dt for all, as if nobody met.
 
     What rounding cuts off is kept for the next time (Kahan, Comm. ACM 8, 40, 1965): hundreds of
     small steps would else round ten times as much as the few flights event by event that they are.
     """
-    disks, acceleration, dt = motion.disks, motion.acceleration, motion.dt
+    disks, acceleration, dt = system.disks, system.acceleration, system.dt
     x, v = disks.position.reshape(-1), disks.velocity.reshape(-1)
     cut = disks.remainder.reshape(-1)
     a, steady = acceleration.now.reshape(-1), acceleration.steady.reshape(-1)
@@ -149,11 +149,11 @@ def fly(motion: Motion) -> None:
 
 
 @kernel
-def turn(motion: Motion, count: int) -> None:
+def turn(system: System, count: int) -> None:
     """The angles and spins of `count` steps: of all at last, as no collision asks for them without
     friction."""
-    acceleration, dt = motion.acceleration, motion.dt
-    angle, spin = motion.disks.angle, motion.disks.angular_velocity
+    acceleration, dt = system.acceleration, system.dt
+    angle, spin = system.disks.angle, system.disks.angular_velocity
     turning = acceleration.turning
     for run in range(len(acceleration.moving)):
         begin, end = np.int64(acceleration.moving[run, 0]), np.int64(acceleration.moving[run, 1])
@@ -165,16 +165,16 @@ def turn(motion: Motion, count: int) -> None:
 
 @inlined
 def resolve(
-    motion: Motion, near, agenda, k: int, count: int, collisions: list, pushed: list
+    system: System, near, agenda, k: int, count: int, collisions: list, pushed: list
 ) -> None:
     """Meeting after meeting of a step in which all have flown to its end."""
-    disks, world, now = motion.disks, motion.world, -motion.dt
-    most, held, any_held = MOST * len(disks.radius), motion.acceleration.held, False
+    disks, world, now = system.disks, system.world, -system.dt
+    most, held, any_held = MOST * len(disks.radius), system.acceleration.held, False
     for c in range(most + 1):
         if holds(near):
-            first = first_meeting(motion, near, agenda, now)
+            first = first_meeting(system, near, agenda, now)
         else:
-            first = first_of_all_pairs(motion, near, now)
+            first = first_of_all_pairs(system, near, now)
         now, i, j = first
         alone = near.found[PAIRS] + near.found[WALLS] == 1
         if i == NOBODY or (c == most and (alone or world.restitution == 1.0)):
@@ -185,43 +185,43 @@ def resolve(
         else:
             impulse, hold = TOGETHER, 0.0
             if c < most:
-                impulse, hold = collide(motion, i, j, now, alone)
+                impulse, hold = collide(system, i, j, now, alone)
             if impulse == TOGETHER:
                 # after so many collisions, what is near stays together
                 level = min(1 + max(held[i], held[max(i, j)], ALONE), LAST) if c < most else LAST
                 any_held = True
-                impulse, hold = settle(motion, near, agenda, first, level, k, collisions, pushed)
+                impulse, hold = settle(system, near, agenda, first, level, k, collisions, pushed)
             if impulse > 0.0:
                 if len(pushed) > 0:
-                    release(motion, near, agenda, i, j, now, collisions, pushed)
+                    release(system, near, agenda, i, j, now, collisions, pushed)
                 collisions.append((k, i, j, impulse))
                 if hold > 0.0 and not alone:
                     pushed.append((i, j, len(collisions) - 1, hold))
                     held[i], held[max(i, j)] = max(held[i], ALONE), max(held[max(i, j)], ALONE)
-            mark_changed(motion, near, agenda, i)
+            mark_changed(system, near, agenda, i)
             if j >= 0:
-                mark_changed(motion, near, agenda, j)
+                mark_changed(system, near, agenda, j)
         if not holds(near):
-            find_near(motion, near, agenda, now, count - k)
+            find_near(system, near, agenda, now, count - k)
     if any_held:
         held[:] = 0
         pushed.clear()
 
 
 @compiled
-def find_near(motion: Motion, near, agenda, now: float, steps: int) -> None:
+def find_near(system: System, near, agenda, now: float, steps: int) -> None:
     """Build the list at the end of a step, and put down all meetings from `now` on: in the step,
     each may have been a step away from its end."""
-    disks, longest = motion.disks, 0.0
+    disks, longest = system.disks, 0.0
     for i in range(len(disks.mass)):
         if disks.mass[i] != inf:
-            longest = max(longest, way_in_step(motion, i))
+            longest = max(longest, way_in_step(system, i))
     near.length[STRIDE] = longest
-    build_list(near, disks.position, disks.radius, motion.world, steps)
+    build_list(near, disks.position, disks.radius, system.world, steps)
     near.length[SLACK] -= longest
     agenda.length[INDEXED] = 0
     if holds(near):
-        list_meetings(motion, near, agenda, now)
+        list_meetings(system, near, agenda, now)
 
 
 @kernel
@@ -261,13 +261,13 @@ def opening_acceleration(path, s: float, nx: float, ny: float) -> float:
 
 
 @kernel
-def collide(motion: Motion, i: int, j: int, s: float, alone: bool) -> tuple[float, float]:
+def collide(system: System, i: int, j: int, s: float, alone: bool) -> tuple[float, float]:
     """The impulse J = -(1 + e) (vi - vj).n / (1/mi + 1/mj) at s, and both on their new ways to the
     end; returns J, and the force that holds them from then on. Unless they are alone, where they
     would rest or part by less than g dt / 32: `TOGETHER`, and nothing is done."""
-    dt, low = motion.dt, motion.acceleration.strongest * motion.dt * REST
-    e, hold, path = motion.world.restitution, 0.0, path_of(motion, i, j)
-    wi, wj = weights(motion.disks.mass, i, j)
+    dt, low = system.dt, system.acceleration.strongest * system.dt * REST
+    e, hold, path = system.world.restitution, 0.0, path_of(system, i, j)
+    wi, wj = weights(system.disks.mass, i, j)
     _, rate, nx, ny = contact(path, s)
     speed = max(-rate, 0.0)
     inward = -(path[4] * nx + path[5] * ny) - opening_acceleration(path, s, nx, ny)
@@ -278,31 +278,31 @@ def collide(motion: Motion, i: int, j: int, s: float, alone: bool) -> tuple[floa
     if rests:
         e, hold = 0.0, inward / (wi + wj)
     J = (1.0 + e) * speed / (wi + wj)
-    apply_push(motion, i, j, nx, ny, J, hold, s)
-    if motion.world.friction > 0.0:
-        apply_friction(motion, i, j, path, J, hold, s)
+    apply_push(system, i, j, nx, ny, J, hold, s)
+    if system.world.friction > 0.0:
+        apply_friction(system, i, j, path, J, hold, s)
     return J - hold * s, hold
 
 
 @compiled
-def release(motion: Motion, near, agenda, i: int, j: int, s: float, collisions, pushed) -> None:
+def release(system: System, near, agenda, i: int, j: int, s: float, collisions, pushed) -> None:
     """From s on, no force holds a contact of disk i or j that a collision has opened."""
     for p in range(len(pushed)):
         a, b, row, hold = pushed[p]
         if hold > 0.0 and (a in (i, j) or b in (i, j)):
-            _, rate, nx, ny = contact(path_of(motion, a, b), s)
-            if rate > COARSE * motion.acceleration.strongest * motion.dt:
-                apply_push(motion, a, b, nx, ny, 0.0, -hold, s)
+            _, rate, nx, ny = contact(path_of(system, a, b), s)
+            if rate > COARSE * system.acceleration.strongest * system.dt:
+                apply_push(system, a, b, nx, ny, 0.0, -hold, s)
                 k, _, _, impulse = collisions[row]
                 collisions[row] = (k, a, b, impulse + hold * s)
                 pushed[p] = (a, b, row, 0.0)
                 for d in (a, max(a, b)):
-                    mark_changed(motion, near, agenda, d)
+                    mark_changed(system, near, agenda, d)
 
 
 @compiled
 def settle(
-    motion: Motion, near, agenda, first, level: int, k: int, collisions: list, pushed: list
+    system: System, near, agenda, first, level: int, k: int, collisions: list, pushed: list
 ) -> tuple[float, float]:
     """All that touch the two that meet first, and each other, at once: the impulses without bounce
     and then the forces, all >= 0, with which no gap of theirs closes before the end of the step.
@@ -311,25 +311,25 @@ def settle(
     A gap is convex along a straight way, so one that is open at the end by its normal now stays
     open. With friction, its impulses and forces follow from those, and then they once more.
     """
-    world, mass, acceleration = motion.world, motion.disks.mass, motion.acceleration
-    s, e, step = first[0], world.restitution, acceleration.strongest * motion.dt
+    world, mass, acceleration = system.world, system.disks.mass, system.acceleration
+    s, e, step = first[0], world.restitution, acceleration.strongest * system.dt
     slow = step * REST / (2.0 * e) if e > 0.0 and level < LAST else inf
-    contacts = touching(motion, near, first, REACH[level], slow)
+    contacts = touching(system, near, first, REACH[level], slow)
     m = len(contacts)
     if m < 2:
-        return collide(motion, first[1], first[2], s, True)
+        return collide(system, first[1], first[2], s, True)
     place, push = np.full(m, -1), np.zeros((2, m))  # impulses in N s, forces in N
     for c in range(m):
         for p in range(len(pushed)):
             if pushed[p][0] == contacts[c][0] and pushed[p][1] == contacts[c][1]:
                 place[c], push[1, c] = p, pushed[p][3]
     start, tolerance = push[1].copy(), min(LEEWAY[level], COARSE)
-    push_contacts(motion, contacts, push, tolerance, s)
+    push_contacts(system, contacts, push, tolerance, s)
     if world.friction > 0.0:
         for c in range(m):
             (i, j), rise = contacts[c], max(push[1, c] - start[c], 0.0)
-            apply_friction(motion, i, j, path_of(motion, i, j), push[0, c], rise, s)
-        push_contacts(motion, contacts, push, tolerance, s)
+            apply_friction(system, i, j, path_of(system, i, j), push[0, c], rise, s)
+        push_contacts(system, contacts, push, tolerance, s)
     for c in range(m):
         i, j = contacts[c]
         p, hold, impulse = int(place[c]), push[1, c], push[0, c] - (push[1, c] - start[c]) * s
@@ -343,15 +343,15 @@ def settle(
         for d in (i, max(i, j)):
             if mass[d] != inf:
                 acceleration.held[d] = level
-                mark_changed(motion, near, agenda, d)
+                mark_changed(system, near, agenda, d)
     return TOGETHER, 0.0
 
 
 @compiled
-def touching(motion: Motion, near: NeighbourList, first, reach: float, slow: float) -> list:
+def touching(system: System, near: NeighbourList, first, reach: float, slow: float) -> list:
     """The contacts (i, j) that join the two that meet first and all that touch them in turn: closer
     than `reach` radii, and closing by less than `slow` m/s."""
-    mass, s = motion.disks.mass, first[0]
+    mass, s = system.disks.mass, first[0]
     pairs, contacts = near.found[PAIRS], [(0, 0) for _ in range(0)]
     joined, taken = np.zeros(len(mass), np.bool_), np.zeros(pairs + near.found[WALLS], np.bool_)
     count = -1
@@ -364,7 +364,7 @@ def touching(motion: Motion, near: NeighbourList, first, reach: float, slow: flo
             j = np.int64(near.second[p]) if p < pairs else -1 - np.int64(near.wall[p - pairs])
             if taken[p] or not (joined[i] or joined[max(i, j)]):
                 continue
-            path = path_of(motion, i, j)
+            path = path_of(system, i, j)
             gap, rate, _, _ = contact(path, s)
             if gap < reach * path[8] and -rate < slow:
                 taken[p] = True
@@ -375,14 +375,14 @@ def touching(motion: Motion, near: NeighbourList, first, reach: float, slow: flo
 
 
 @compiled
-def push_contacts(motion: Motion, contacts, push, tolerance: float, s: float) -> None:
+def push_contacts(system: System, contacts, push, tolerance: float, s: float) -> None:
     """Change the impulses push[0] and then the forces push[1] (m,) of these contacts, from s on."""
-    mass, m, h = motion.disks.mass, len(contacts), max(-s, EXACT * motion.dt)
+    mass, m, h = system.disks.mass, len(contacts), max(-s, EXACT * system.dt)
     normal, weight, open = np.empty((m, 2)), np.empty((m, 2)), np.empty(m)
     for held in range(2):  # by an impulse, by a force
         for c in range(m):
             i, j = contacts[c]
-            path = path_of(motion, i, j)
+            path = path_of(system, i, j)
             gap, rate, nx, ny = contact(path, s)
             open[c] = rate + max(gap, 0.0) / h
             if held:
@@ -390,14 +390,14 @@ def push_contacts(motion: Motion, contacts, push, tolerance: float, s: float) ->
                 open[c] = 2.0 * open[c] / h + straight + opening_acceleration(path, s, nx, ny)
             normal[c, 0], normal[c, 1] = nx, ny
             weight[c, 0], weight[c, 1] = weights(mass, i, j)
-        before, scale = push[held].copy(), motion.acceleration.strongest * (1.0 if held else h)
-        bodies = len(mass) + len(motion.world.walls)
+        before, scale = push[held].copy(), system.acceleration.strongest * (1.0 if held else h)
+        bodies = len(mass) + len(system.world.walls)
         solve_pushes(contacts, weight, normal, open, push[held], bodies, tolerance, scale)
         for c in range(m):
             i, j = contacts[c]
             change, nx, ny = push[held, c] - before[c], normal[c, 0], normal[c, 1]
             J, hold = (0.0, change) if held else (change, 0.0)
-            apply_push(motion, i, j, nx, ny, J, hold, s)
+            apply_push(system, i, j, nx, ny, J, hold, s)
 
 
 @compiled
@@ -475,10 +475,10 @@ def compute_effect(contacts, weight, normal, push, way, effect) -> None:
 
 @kernel
 def apply_push(
-    motion: Motion, i: int, j: int, nx: float, ny: float, J: float, hold: float, s: float
+    system: System, i: int, j: int, nx: float, ny: float, J: float, hold: float, s: float
 ) -> None:
     """From s on, as if the two had left with the impulse J and the force `hold` along n."""
-    disks, acceleration = motion.disks, motion.acceleration.now
+    disks, acceleration = system.disks, system.acceleration.now
     wi, wj = weights(disks.mass, i, j)
     for d, weight in ((i, wi), (j, -wj)):
         if d < 0:
@@ -492,7 +492,7 @@ def apply_push(
 
 @kernel
 def apply_friction(
-    motion: Motion, i: int, j: int, path, normal: float, pressing: float, s: float
+    system: System, i: int, j: int, path, normal: float, pressing: float, s: float
 ) -> None:
     """Coulomb's friction of two that were on this path up to s: by the impulse `normal`, N s, along
     the normal at once, then by the force `pressing`, N, which brakes until the surfaces do not
@@ -501,7 +501,7 @@ def apply_friction(
     The slip is that of i against j where they touch, along t = (-ny, nx). It is exact for one
     contact that lasts; of two of the same disk the second does not know that the first turns it.
     """
-    disks, acceleration, friction = motion.disks, motion.acceleration.now, motion.world.friction
+    disks, acceleration, friction = system.disks, system.acceleration.now, system.world.friction
     most, most_held, (_, _, nx, ny) = friction * normal, friction * pressing, contact(path, s)
     slip = (path[3] + path[5] * s) * nx - (path[2] + path[4] * s) * ny
     growth = path[5] * nx - path[4] * ny  # of the slip in m/s2, as long as nothing brakes

@@ -3,7 +3,7 @@ bound."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -65,6 +65,18 @@ class Probe:
     # (collisions, numbers that are none). A solver's own file gets these from the harness, so a
     # failure is due to its physics, and departs.
     handed_on: bool = False
+
+
+Questions = Mapping[Callable[[EngineRow], ProbeReading], str]  # what reads a probe -> its question
+
+
+def probes(
+    questions: Questions, failure: Literal["breaks", "departs"], handed_on: bool = False
+) -> dict[str, Probe]:
+    """The probes by the names of their functions."""
+    return {
+        read.__name__: Probe(asked, read, failure, handed_on) for read, asked in questions.items()
+    }
 
 
 @contextmanager

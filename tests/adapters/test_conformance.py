@@ -55,25 +55,6 @@ def test_a_departure_is_as_large_as_its_cause_makes_it(departure):
     assert abs(departure.value - finding.expected) > finding.bound + departure.bound
 
 
-def test_only_shipped_profiles_depart_from_the_impact_law():
-    # The matched profiles and the reference keep e at every speed, momentum, and the tangential
-    # velocities; but for Box2D 3.1, whose friction in a bounce no setting makes right.
-    law = {probe for probe in PROBES if probe.startswith(("restitution", "friction", "pair"))}
-    departing = {
-        name
-        for name in ENGINES
-        if name.startswith("reference:") or name.endswith((":shipped", ":matched"))
-        for probe in law
-        if findings_of(name)[probe].verdict != "keeps"
-    }
-    shipped = {name for name in departing if name.endswith(":shipped")}
-    assert {"pymunk:shipped", "box2d:shipped", "box2d_v3:shipped"} <= shipped
-    assert departing == shipped | {"box2d_v3:matched"}
-    amiss = {probe for probe in law if findings_of("box2d_v3:matched")[probe].verdict != "keeps"}
-    assert amiss == {"friction_0.5", "friction_1", "friction_at_rest"}
-    assert all(finding.verdict == "keeps" for finding in findings_of("reference:exercise").values())
-
-
 # Each cause is turned off alone: the departure must go with it.
 
 

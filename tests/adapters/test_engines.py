@@ -267,16 +267,6 @@ def test_a_hand_written_solver_says_its_integrator_and_is_entered_with_two_array
     assert ablated_reference.__name__ not in ADVANCE
 
 
-def test_matched_pymunk_resolves_slop_and_iterations_as_asked():
-    from crosscheck2d.adapters.pymunk import MATCHED
-
-    with loaded(ENGINES["pymunk:matched"], plain()) as engine:
-        slop = 0.25 * MATCHED["slop"]
-        assert engine.settings()["collision_slop"] == (slop, slop)
-        assert engine.settings()["iterations"] == (MATCHED["iterations"], MATCHED["iterations"])
-        assert engine.space.collision_slop == slop
-
-
 def test_box2d_v3_reads_its_length_unit_off_the_engine():
     # Off a default that is a multiple of it; negative control: what was asked for is not simply
     # repeated.
