@@ -18,6 +18,7 @@ from crosscheck2d.scenarios.truth.exact import ACCURACY, TruthRecord, computed
 from crosscheck2d.scenarios.truth.oracle import events as oracle_events
 from crosscheck2d.scenarios.truth.oracle.events import Path, trace
 from crosscheck2d.scenarios.truth.oracle.numbers import balls, mpfr
+from tests.adapters.event_driven.test_symmetries import changed
 from tests.scenarios.test_catalogue import smallest_gap
 from tests.scenarios.test_closed_forms import FLYING
 
@@ -141,22 +142,16 @@ def last_of(path: Path) -> np.ndarray:
 
 def test_the_order_of_the_disks_does_not_matter():
     scene, order = sampled(5, 6, 0.9, -1.0), np.random.default_rng(1).permutation(6)
-    names = ("position", "velocity", "radius", "mass", "inertia", "angle", "angular_velocity")
-    permuted = replace(scene, **{name: getattr(scene, name)[order] for name in names})
-    here, there = (last_of(trace(each, [], 2.0, mpfr(256))) for each in (scene, permuted))
+    scenes = scene, changed(scene, order)
+    here, there = (last_of(trace(each, [], 2.0, mpfr(256))) for each in scenes)
 
     np.testing.assert_array_equal(here[order], there)
 
 
 def test_a_mirrored_scene_moves_as_the_mirror_image():
-    scene, flip = sampled(6, 6, 0.9, -1.0), np.array([-1.0, 1.0])
-    mirrored = replace(
-        scene,
-        position=scene.position * flip,
-        velocity=scene.velocity * flip,
-        walls=scene.walls * flip,
-    )
-    here, there = (last_of(trace(each, [], 2.0, mpfr(256))) for each in (scene, mirrored))
+    scene = sampled(6, 6, 0.9, -1.0)
+    scenes = scene, changed(scene, flip=(-1.0, 1.0))
+    here, there = (last_of(trace(each, [], 2.0, mpfr(256))) for each in scenes)
 
     np.testing.assert_array_equal(here * [1, -1, 1, -1, 1, -1, 1], there)
 

@@ -7,10 +7,10 @@ them again and compares.
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from crosscheck2d.adapters.event_driven.events import EventEngine
 from crosscheck2d.reports.stability.predicates_gas import compressibility
@@ -64,19 +64,12 @@ def measured(
 
 
 def read() -> dict[float, dict[str, float]]:
-    with TABLE.open() as file:
-        rows = [{name: float(value) for name, value in row.items()} for row in csv.DictReader(file)]
-    return {row["packing"]: row for row in rows}
+    return pd.read_csv(TABLE, index_col="packing").assign(packing=PACKINGS).to_dict("index")
 
 
 def main() -> None:
-    rows = [measured(packing) for packing in PACKINGS]
-    with TABLE.open("w", newline="") as file:
-        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(
-            {name: float(f"{value:.9g}") for name, value in row.items()} for row in rows
-        )
+    table = pd.DataFrame([measured(packing) for packing in PACKINGS])
+    table.to_csv(TABLE, index=False, float_format="%.9g")
     print(TABLE.read_text())
 
 
