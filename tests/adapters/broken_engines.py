@@ -4,7 +4,7 @@ there to catch."""
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import fields, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,7 +14,7 @@ from crosscheck2d.adapters.engine_row import EngineRow
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.adapters.reference import Reference
 from crosscheck2d.reference_impl import exercise, ordered
-from crosscheck2d.scenarios.model import State
+from crosscheck2d.scenarios.model import Scene, State
 
 
 class Sound(Reference):
@@ -22,23 +22,82 @@ class Sound(Reference):
         super().__init__(exercise)
 
 
-class LeaksMomentum(Sound):
-    """A millionth of a disk's velocity is lost in every collision."""
-
-    def step(self, count=1):
-        for _ in range(count):
-            before = len(self.log)
-            super().step()
-            for collision in self.log[before:]:
-                self.disks.velocity[collision.i] *= 1 - 1e-6
+Broken = type[Sound]
 
 
-class GivesLiveView(Sound):
-    """`read` hands out the solver's own arrays."""
+def loads(change: Callable[[Scene], Scene]) -> Broken:
+    """Another scene than the one that is given."""
 
-    def read(self):
-        disks = self.disks
-        return State(disks.position, disks.velocity, disks.angle, disks.angular_velocity)
+    class Loads(Sound):
+        def load(self, scene, dt):
+            super().load(change(scene), dt)
+
+    return Loads
+
+
+def reads(change: Callable[[Sound, State], State]) -> Broken:
+    class Reads(Sound):
+        def read(self):
+            return change(self, super().read())
+
+    return Reads
+
+
+def reports(change: Callable[[Sound, list[ContactImpulse]], list[ContactImpulse]]) -> Broken:
+    class Reports(Sound):
+        def collisions(self):
+            return change(self, self.log)
+
+    return Reports
+
+
+def steps(after: Callable[[Sound, list[ContactImpulse]], None]) -> Broken:
+    """What `after` does with the engine and the collisions of a step follows each step."""
+
+    class Steps(Sound):
+        def step(self, count=1):
+            for _ in range(count):
+                before = len(self.log)
+                super().step()
+                after(self, self.log[before:])
+
+    return Steps
+
+
+def leak_momentum(engine: Sound, collisions: list[ContactImpulse]) -> None:
+    # a millionth of a disk's velocity is lost in every collision
+    for collision in collisions:
+        engine.disks.velocity[collision.i] *= 1 - 1e-6
+
+
+def rub_sidewise(engine: Sound, collisions: list[ContactImpulse]) -> None:
+    # the default friction is on: a collision turns a part of the spin into sideways speed
+    velocity, spin = engine.disks.velocity, engine.disks.angular_velocity
+    for disk in (disk for collision in collisions for disk in (collision.i, collision.j)):
+        velocity[disk, 1] += 0.01 * spin[disk]
+
+
+def fall_asleep(engine: Sound, _: list[ContactImpulse]) -> None:
+    engine.disks.velocity[np.hypot(*engine.disks.velocity.T) < 0.01] = 0.0
+
+
+def limit_speed(engine: Sound, _: list[ContactImpulse]) -> None:
+    engine.disks.velocity[...] = np.clip(engine.disks.velocity, -400.0, 400.0)
+
+
+def put_static_last(engine: Sound, state: State) -> State:
+    # moving bodies first, as an engine keeps them
+    order = np.argsort(np.isinf(engine.disks.mass), kind="stable")
+    return State(*(array[order] for array in vars(state).values()))
+
+
+def stop_slow_collisions(scene: Scene) -> Scene:
+    return replace(scene, restitution=0.0) if np.ptp(scene.velocity, axis=0).max() < 1 else scene
+
+
+def number_walls_from_the_end(engine: Sound, log: list[ContactImpulse]) -> list[ContactImpulse]:
+    walls = len(engine.world.walls)
+    return [hit if hit.j >= 0 else hit._replace(j=-1 - walls - hit.j) for hit in log]
 
 
 class IgnoresDt(Sound):
@@ -49,19 +108,6 @@ class IgnoresDt(Sound):
 class IgnoresCount(Sound):
     def step(self, count=1):
         super().step(min(count, 1))
-
-
-class SquaresRestitution(Sound):
-    """e on both bodies, and the engine multiplies."""
-
-    def load(self, scene, dt):
-        super().load(replace(scene, restitution=scene.restitution**2), dt)
-
-
-class StopsSlowCollisions(Sound):
-    def load(self, scene, dt):
-        slow = np.ptp(scene.velocity, axis=0).max() < 1
-        super().load(replace(scene, restitution=0.0) if slow else scene, dt)
 
 
 class NanAtStep7(Sound):
@@ -112,42 +158,6 @@ class SharesOneWorld(Sound):
         super().step(count)
 
 
-class PutsStaticLast(Sound):
-    """Moving bodies first, as an engine keeps them."""
-
-    def read(self):
-        order = np.argsort(np.isinf(self.disks.mass), kind="stable")
-        return State(*(array[order] for array in vars(super().read()).values()))
-
-
-class ReadsFloat32(Sound):
-    def read(self):
-        return State(*(array.astype(np.float32) for array in vars(super().read()).values()))
-
-
-class MassFromDensity(Sound):
-    """A fixture of density 1 set the mass after it was given."""
-
-    def load(self, scene, dt):
-        super().load(
-            replace(scene, mass=np.where(scene.static, np.inf, np.pi * scene.radius**2)), dt
-        )
-
-
-class SolidDiskInertia(Sound):
-    def load(self, scene, dt):
-        super().load(replace(scene, inertia=scene.mass * scene.radius**2 / 2), dt)
-
-
-class VelocityHalfAStepOff(Sound):
-    """Leapfrog: the velocities belong to the middle of the step."""
-
-    def read(self):
-        state = super().read()
-        state.velocity[...] += self.world.gravity * self.dt / 2
-        return state
-
-
 class OtherOrderOfUpdates(Sound):
     """Gravity by Verlet, while the row says symplectic Euler."""
 
@@ -156,73 +166,6 @@ class OtherOrderOfUpdates(Sound):
         for _ in range(count):
             super().step()
             self.disks.position[moving] -= self.world.gravity * self.dt**2 / 2
-
-
-class StaticGivesWay(Sound):
-    """A static disk is only heavy."""
-
-    def load(self, scene, dt):
-        super().load(replace(scene, mass=np.where(scene.static, 1e6, scene.mass), inertia=None), dt)
-
-
-class ReportsNoCollisions(Sound):
-    def collisions(self):
-        return []
-
-
-class NumbersWallsFromTheEnd(Sound):
-    """Walls are known by the engine's list, which is the scene's reversed."""
-
-    def collisions(self):
-        return [
-            ContactImpulse(
-                h.step, h.i, h.j if h.j >= 0 else -1 - (len(self.world.walls) - -h.j), h.impulse
-            )
-            for h in self.log
-        ]
-
-
-class CountsStepsFromOne(Sound):
-    def collisions(self):
-        return [collision._replace(step=collision.step + 1) for collision in self.log]
-
-
-class ReportsImpulsePerSecond(Sound):
-    def collisions(self):
-        return [collision._replace(impulse=collision.impulse / self.dt) for collision in self.log]
-
-
-class RubsSidewise(Sound):
-    """The default friction is on: a collision turns a part of the spin into sideways speed."""
-
-    def step(self, count=1):
-        for _ in range(count):
-            before = len(self.log)
-            super().step()
-            for collision in self.log[before:]:
-                for disk in (collision.i, collision.j):
-                    self.disks.velocity[disk, 1] += 0.01 * self.disks.angular_velocity[disk]
-
-
-class FallsAsleep(Sound):
-    def step(self, count=1):
-        super().step(count)
-        self.disks.velocity[np.hypot(*self.disks.velocity.T) < 0.01] = 0.0
-
-
-class HasSpeedLimit(Sound):
-    def step(self, count=1):
-        super().step(count)
-        self.disks.velocity[...] = np.clip(self.disks.velocity, -400.0, 400.0)
-
-
-class WrapsAngles(Sound):
-    """The engine keeps cos and sin, and nobody unwinds."""
-
-    def read(self):
-        state = super().read()
-        state.angle[...] = np.arctan2(np.sin(state.angle), np.cos(state.angle))
-        return state
 
 
 class RaisesInStep(Sound):
@@ -275,33 +218,64 @@ class RefusesAll(Sound):
 
 
 # Which probe is meant for which fault; other probes may see it too.
-CAUGHT_BY: dict[type[Engine], str] = {
-    PutsStaticLast: "order_and_shapes",
-    ReadsFloat32: "order_and_shapes",
-    WrapsAngles: "order_and_shapes",
-    GivesLiveView: "read_copies",
-    LoadKeepsCollisions: "load_forgets",
-    LoadKeepsForce: "load_forgets",
-    SharesOneWorld: "worlds_are_separate",
-    IgnoresCount: "counts_are_steps",
-    IgnoresDt: "steps_obey_dt",
-    NanAtStep7: "stays_finite",
-    ForceLasts: "force_lasts_one_step",
-    MassFromDensity: "mass_by_force",
-    SolidDiskInertia: "inertia_by_torque",
-    VelocityHalfAStepOff: "same_instant",
-    ReportsNoCollisions: "collisions_are_reported",
-    NumbersWallsFromTheEnd: "walls_are_reported",
-    CountsStepsFromOne: "collisions_name_their_step",
-    ReportsImpulsePerSecond: "impulse_is_reported",
-    StaticGivesWay: "static_stays",
-    OtherOrderOfUpdates: "free_flight",
-    FallsAsleep: "slow_flight",
-    HasSpeedLimit: "fast_flight",
-    LeaksMomentum: "pair_momentum",
-    StopsSlowCollisions: "restitution_0.5",
-    SquaresRestitution: "restitution_wall",
-    RubsSidewise: "friction",
+CAUGHT_BY: dict[str, tuple[type[Engine], str]] = {
+    "static disks are last": (reads(put_static_last), "order_and_shapes"),
+    "float32 is read": (
+        reads(lambda _, state: State(*(a.astype(np.float32) for a in vars(state).values()))),
+        "order_and_shapes",
+    ),
+    "cos and sin are kept, and nobody unwinds": (
+        reads(lambda _, s: replace(s, angle=np.arctan2(np.sin(s.angle), np.cos(s.angle)))),
+        "order_and_shapes",
+    ),
+    "the solver's own arrays are read": (
+        reads(lambda e, _: State(*(getattr(e.disks, f.name) for f in fields(State)))),
+        "read_copies",
+    ),
+    "load keeps collisions": (LoadKeepsCollisions, "load_forgets"),
+    "load keeps a force": (LoadKeepsForce, "load_forgets"),
+    "engines share one world": (SharesOneWorld, "worlds_are_separate"),
+    "the count of steps is ignored": (IgnoresCount, "counts_are_steps"),
+    "dt is ignored": (IgnoresDt, "steps_obey_dt"),
+    "NaN at step 7": (NanAtStep7, "stays_finite"),
+    "nobody clears the forces": (ForceLasts, "force_lasts_one_step"),
+    "a density of 1 gives the mass": (
+        loads(lambda s: replace(s, mass=np.where(s.static, np.inf, np.pi * s.radius**2))),
+        "mass_by_force",
+    ),
+    "the inertia is that of a solid disk": (
+        loads(lambda s: replace(s, inertia=s.mass * s.radius**2 / 2)),
+        "inertia_by_torque",
+    ),
+    "velocities belong to the middle of the step": (  # leapfrog
+        reads(lambda e, s: replace(s, velocity=s.velocity + e.world.gravity * e.dt / 2)),
+        "same_instant",
+    ),
+    "no collision is reported": (reports(lambda *_: []), "collisions_are_reported"),
+    "walls are numbered from the end": (reports(number_walls_from_the_end), "walls_are_reported"),
+    "steps are counted from 1": (
+        reports(lambda _, log: [hit._replace(step=hit.step + 1) for hit in log]),
+        "collisions_name_their_step",
+    ),
+    "an impulse is reported per second": (
+        reports(lambda e, log: [hit._replace(impulse=hit.impulse / e.dt) for hit in log]),
+        "impulse_is_reported",
+    ),
+    "a static disk is only heavy": (
+        loads(lambda s: replace(s, mass=np.where(s.static, 1e6, s.mass), inertia=None)),
+        "static_stays",
+    ),
+    "gravity by Verlet": (OtherOrderOfUpdates, "free_flight"),
+    "what is slow falls asleep": (steps(fall_asleep), "slow_flight"),
+    "speeds are limited": (steps(limit_speed), "fast_flight"),
+    "momentum leaks": (steps(leak_momentum), "pair_momentum"),
+    "slow collisions stop": (loads(stop_slow_collisions), "restitution_0.5"),
+    # e on both bodies, and the engine multiplies
+    "restitution is squared": (
+        loads(lambda s: replace(s, restitution=s.restitution**2)),
+        "restitution_wall",
+    ),
+    "disks rub": (steps(rub_sidewise), "friction"),
 }
 
 
