@@ -168,8 +168,8 @@ def resolve(
     system: System, near, agenda, k: int, count: int, collisions: list, pushed: list
 ) -> None:
     """Meeting after meeting of a step in which all have flown to its end."""
-    disks, world, now = system.disks, system.world, -system.dt
-    most, held, any_held = MOST * len(disks.radius), system.acceleration.held, False
+    held, any_held, now = system.acceleration.held, False, -system.dt
+    most = MOST * len(held)
     for c in range(most + 1):
         if holds(near):
             first = first_meeting(system, near, agenda, now)
@@ -177,10 +177,10 @@ def resolve(
             first = first_of_all_pairs(system, near, now)
         now, i, j = first
         alone = near.found[PAIRS] + near.found[WALLS] == 1
-        if i == NOBODY or (c == most and (alone or world.restitution == 1.0)):
+        if i == NOBODY or (c == most and (alone or system.world.restitution == 1.0)):
             break
         if j == EDGE:
-            carry_over(disks.position, world, i)
+            carry_over(system.disks.position, system.world, i)
             near.length[SLACK] = -inf
         else:
             impulse, hold = TOGETHER, 0.0
@@ -212,12 +212,12 @@ def resolve(
 def find_near(system: System, near, agenda, now: float, steps: int) -> None:
     """Build the list at the end of a step, and put down all meetings from `now` on: in the step,
     each may have been a step away from its end."""
-    disks, longest = system.disks, 0.0
-    for i in range(len(disks.mass)):
-        if disks.mass[i] != inf:
+    x, mass, longest = system.disks.position, system.disks.mass, 0.0
+    for i in range(len(mass)):
+        if mass[i] != inf:
             longest = max(longest, way_in_step(system, i))
     near.length[STRIDE] = longest
-    build_list(near, disks.position, disks.radius, system.world, steps)
+    build_list(near, x, system.disks.radius, system.world, steps)
     near.length[SLACK] -= longest
     agenda.length[INDEXED] = 0
     if holds(near):
@@ -311,8 +311,8 @@ def settle(
     A gap is convex along a straight way, so one that is open at the end by its normal now stays
     open. With friction, its impulses and forces follow from those, and then they once more.
     """
-    world, mass, acceleration = system.world, system.disks.mass, system.acceleration
-    s, e, step = first[0], world.restitution, acceleration.strongest * system.dt
+    mass, held = system.disks.mass, system.acceleration.held
+    s, e, step = first[0], system.world.restitution, system.acceleration.strongest * system.dt
     slow = step * REST / (2.0 * e) if e > 0.0 and level < LAST else inf
     contacts = touching(system, near, first, REACH[level], slow)
     m = len(contacts)
@@ -325,7 +325,7 @@ def settle(
                 place[c], push[1, c] = p, pushed[p][3]
     start, tolerance = push[1].copy(), min(LEEWAY[level], COARSE)
     push_contacts(system, contacts, push, tolerance, s)
-    if world.friction > 0.0:
+    if system.world.friction > 0.0:
         for c in range(m):
             (i, j), rise = contacts[c], max(push[1, c] - start[c], 0.0)
             apply_friction(system, i, j, path_of(system, i, j), push[0, c], rise, s)
@@ -342,7 +342,7 @@ def settle(
             collisions.append((k, i, j, impulse))
         for d in (i, max(i, j)):
             if mass[d] != inf:
-                acceleration.held[d] = level
+                held[d] = level
                 mark_changed(system, near, agenda, d)
     return TOGETHER, 0.0
 
