@@ -141,7 +141,7 @@ class Game {
     banner.classList.toggle("won", frame.won);
     if (frame.won) this.tell("You won");
     else if (frame.over) this.tell(this.field.replayed ? "The flight ends here" : "The flight is over");
-    else if (frame.set_back && frame.t - frame.set_back.t < 3) this.tell(`The ship left the field: back to the ${frame.set_back.beside ? "free place nearest to the start, which is taken" : "start"}`);
+    else if (frame.set_back && frame.t - frame.set_back < 3) this.tell("The ship left the field: back to the free place nearest to its start");
     else if (this.paused) this.tell(frame.frame ? "Paused" : "P starts the flight");
     else this.tell("");
     this.showPace(frame);
@@ -156,22 +156,13 @@ class Game {
     put("ship_deviation", flies && !solid ? figure(flyer.ship_deviation) : "");
     put("deviation", flies && !solid ? figure(flyer.deviation) : "");
     put("collisions", flyer ? String(flyer.collisions) : "");
-    put("diverged", flyer ? this.story(flyer, row.dataset.engine) : "");
+    put("diverged", flyer ? this.story(flyer) : "");
     cell("diverged").classList.toggle("gone", Boolean(flyer?.left));
   }
 
-  story(flyer, name) {
+  story(flyer) {
     if (flyer.left) return farewell(flyer);
-    const { solid, solid_since: since } = this.now;
-    const told = flyer.diverged ? [this.divergence(flyer.diverged, solid)] : [];
-    if (since && name === this.field.engines[solid]) told.push(`solid since ${since.toFixed(2)} s, when ${shortName(this.lastSolid())} left`);
-    return told.join("; ");
-  }
-
-  // The one that the solid one took over from.
-  lastSolid() {
-    const { flyers, solid, solid_since: since } = this.now;
-    return this.field.engines[flyers.slice(0, solid).findLastIndex((flyer) => flyer.left_at === since)];
+    return flyer.diverged ? this.divergence(flyer.diverged, this.now.solid) : "";
   }
 
   divergence({ t, disks: [i, j], solid, only }, now) {
