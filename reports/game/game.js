@@ -18,7 +18,10 @@ class Game {
 
   connect() {
     this.socket = new WebSocket(`ws://${location.host}/fly`);
-    this.socket.onopen = () => { this.say(this.field ? "" : "Starting the engines. The first start compiles them, which takes a while …"); if (this.field) this.begin(); };
+    this.socket.onopen = () => {
+      if (this.field) location.reload();  // the server may have been started anew, with other engines
+      else this.say("Starting the engines. The first start compiles them, which takes a while …");
+    };
     this.socket.onmessage = (event) => this.hear(JSON.parse(event.data));
     this.socket.onclose = (event) => {
       this.say(`${event.reason || "The server does not answer"}. Trying again …`);
@@ -39,7 +42,6 @@ class Game {
   }
 
   open(field) {
-    if (field.server && field.server !== document.body.dataset.server) { location.reload(); return; }  // started anew: other engines, or another flight
     Object.assign(this, { field, frames: [field.first, field.first], waiting: 0, owed: 0 });
     this.stopped.clear();
     this.gone.clear();

@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from secrets import token_hex
 from time import monotonic
 from urllib.parse import urlsplit
 
@@ -42,8 +41,6 @@ class Game:
     # engine -> what `check` says of its file
     said: Mapping[str, Sequence[Said]] = field(default_factory=dict)
     tabs: int = 0
-    # by which a page knows its own server from a later one
-    mark: str = field(default_factory=lambda: token_hex(8))
 
     async def page(self, _: Request) -> HTMLResponse:
         # in space there is no friction, and who adds it gives the bits of another engine
@@ -82,7 +79,7 @@ class Game:
         try:
             session = await in_thread(Session, self.engines, self.file, self.restitution)
             with suppress(WebSocketDisconnect):
-                await socket.send_json(session.field() | {"server": self.mark})
+                await socket.send_json(session.field())
                 await converse(socket, session)
         finally:
             if session is not None and not session.given_up:
