@@ -418,15 +418,14 @@ def test_a_lost_connection_is_reported_and_the_page_is_loaded_anew(browser: Brow
     with served(application(game)) as url, paused(browser, url) as page:
         fly(page, 3)
         game.engines = ["reference:exercise", "box2d:shipped"]  # as a later server has
-        page.evaluate("game.socket.close()")
+        page.evaluate("window.before = true; game.socket.close()")
         page.wait_for_function(
             "() => document.getElementById('banner').textContent.includes('Trying again')"
         )
-        page.wait_for_function(
-            "() => window.game?.field?.engines[1] === 'box2d:shipped'", timeout=10_000
-        )
-        frame, ticked = page.evaluate(
-            "[game.now.frame, game.rows.filter((row) => !row.matches('.off')).length]"
+        page.wait_for_function("() => !window.before && window.game?.field", timeout=10_000)
+        frame, engines, ticked = page.evaluate(
+            "[game.now.frame, game.field.engines,"
+            " game.rows.filter((row) => !row.matches('.off')).length]"
         )
 
-    assert (frame, ticked) == (0, 2)
+    assert (frame, engines, ticked) == (0, ["reference:exercise", "box2d:shipped"], 2)
