@@ -117,13 +117,8 @@ ADDED: dict[str, list[Added]] = {
         ),
         Added(
             "reports/compare/metrics.py",
-            '    Metric(toy_metric, "1", (ITSELF,)),\n',
-            "    Metric(position_max_radii,",
-        ),
-        Added(
-            "reports/compare/metrics.toml",
-            'toy_metric = ["", "42, whatever was played."]\n',
-            "position_max_radii",
+            '    Metric(toy_metric, "1", (ITSELF,), "", "42, whatever was played."),\n',
+            "    Metric(\n        position_max_radii,",
         ),
     ],
     "a lesson": [

@@ -1,15 +1,13 @@
 """The metrics: the function, the unit, and what each is measured against.
 
-To add one, write `def name(view) -> Value | None`, its row in `ROWS` and its texts in metrics.toml.
-A metric that does not apply to a scene returns None. CONTRIBUTING.md says which tests it must pass.
+To add one, write `def name(view) -> Value | None` and its row in `ROWS`. A metric that does not
+apply to a scene returns None. CONTRIBUTING.md says which tests it must pass.
 """
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable
-from pathlib import Path
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -193,61 +191,300 @@ def _largest_of_disks(values: Array, view: View) -> Value:
     return Value(float(values[k, disk]), int(disk), float(view.played.t[k]))
 
 
-class Metric(NamedTuple):
+@dataclass(frozen=True)
+class Metric:
     of: Callable[[View], Value | None]  # its name is that of the metric
     unit: str  # "1" for a ratio
     against: tuple[str, ...]  # `ITSELF`, `TRUTH`, `ENGINE` (against.py)
+    title: str = ""  # the heading in tables; "": the name itself
+    summary: str = ""  # what the number is; `crosscheck list metrics` prints it
     better: str = "lower"  # or "higher", "zero", "as stated" where none is best
 
-    @property
-    def title(self) -> str:
-        """The heading in tables; "": the name itself."""
-        return TEXTS[self.of.__name__][0]
 
-    @property
-    def summary(self) -> str:
-        """What the number is; `crosscheck list metrics` prints it."""
-        return TEXTS[self.of.__name__][1]
-
-
-TEXTS: dict[str, list[str]] = tomllib.loads(
-    Path(__file__).with_name("metrics.toml").read_text(encoding="utf-8")
-)
 BESIDE = (TRUTH, ENGINE)
 ROWS = (
-    Metric(position_max_radii, "radii", BESIDE),
-    Metric(position_rms_radii, "radii", BESIDE),
-    Metric(position_max, "m", BESIDE),
-    Metric(position_rms, "m", BESIDE),
-    Metric(velocity_max, "m/s", BESIDE),
-    Metric(velocity_rms, "m/s", BESIDE),
-    Metric(angular_velocity_max, "rad/s", BESIDE),
-    Metric(angle_max, "rad", BESIDE),
-    Metric(angle_rms, "rad", BESIDE),
-    Metric(time_to_1pct_s, "s", BESIDE, "higher"),
-    Metric(momentum_error, "1", (ITSELF,)),
-    Metric(momentum_deviation, "1", BESIDE),
-    Metric(angular_momentum_error, "1", (ITSELF,)),
-    Metric(energy_error, "1", (ITSELF, TRUTH)),
-    Metric(energy_deviation, "1", BESIDE),
-    Metric(energy_created, "1", (ITSELF,)),
-    Metric(collisions.apex_change, "%", (ITSELF,), "zero"),
-    Metric(energy_loss_error, "1", (TRUTH,), "zero"),
-    Metric(collisions.restitution, "1", (ITSELF,), "as stated"),
-    Metric(collisions.restitution_error, "1", (ITSELF,)),
-    Metric(penetration_radii, "radii", (ITSELF,)),
-    Metric(disks_tunnelled, "disks", (ITSELF,)),
-    Metric(collisions.collision_count_error, "collisions", BESIDE, "zero"),
-    Metric(collisions.collisions_missed, "collisions", BESIDE),
-    Metric(collisions.collisions_spurious, "collisions", BESIDE),
-    Metric(collisions.first_wrong_collision_s, "s", BESIDE, "higher"),
-    Metric(collisions.collision_delay_dt, "dt", BESIDE, "zero"),
-    Metric(collisions.collision_delay_max_dt, "dt", BESIDE),
-    Metric(friction.tangential_velocity_error, "m/s", (TRUTH,)),
-    Metric(friction.friction_impulse_error, "N s", (TRUTH,)),
-    Metric(friction.friction_loss_error, "1", (TRUTH,), "zero"),
-    Metric(friction.restitution_loss_error, "1", (TRUTH,), "zero"),
-    Metric(friction.time_to_roll_error_s, "s", (TRUTH,), "zero"),
-    Metric(friction.slip_at_rest, "m/s", (TRUTH,)),
+    Metric(
+        position_max_radii,
+        "radii",
+        BESIDE,
+        "Position, largest error",
+        "Largest distance of any disk in any sample, in radii of that disk; across an edge of the"
+        " wrap if that is shorter.",
+    ),
+    Metric(
+        position_rms_radii,
+        "radii",
+        BESIDE,
+        "Position, root mean square",
+        "Root mean square distance over the disks that can move, and samples, in radii of each"
+        " disk.",
+    ),
+    Metric(
+        position_max,
+        "m",
+        BESIDE,
+        "Position, largest error",
+        "Largest distance of any disk in any sample.",
+    ),
+    Metric(
+        position_rms,
+        "m",
+        BESIDE,
+        "Position, root mean square",
+        "Root mean square distance over the disks that can move, and samples.",
+    ),
+    Metric(
+        velocity_max,
+        "m/s",
+        BESIDE,
+        "Velocity, largest error",
+        "Largest difference of a disk's velocity from the nearest that it has in the truth within"
+        " 3.2 steps.",
+    ),
+    Metric(
+        velocity_rms,
+        "m/s",
+        BESIDE,
+        "Velocity, root mean square",
+        "Root mean square over the disks that can move, and samples; `velocity_max` is the largest"
+        " of the same differences.",
+    ),
+    Metric(
+        angular_velocity_max,
+        "rad/s",
+        BESIDE,
+        "Angular velocity, largest error",
+        "Largest difference of angular velocity of any disk, in the samples in which"
+        " `velocity_max` is judged; with friction only where the disk has no collision within 3.2"
+        " steps.",
+    ),
+    Metric(
+        angle_max,
+        "rad",
+        BESIDE,
+        "Angle, largest error",
+        "Largest difference of angle of any disk in any sample.",
+    ),
+    Metric(
+        angle_rms,
+        "rad",
+        BESIDE,
+        "Angle, root mean square",
+        "Root mean square difference of angle over the disks that can turn, and samples.",
+    ),
+    Metric(
+        time_to_1pct_s,
+        "s",
+        BESIDE,
+        "Time until 1 % of a radius off",
+        "Time of the first sample at which a disk is off by more than 1 % of its radius; `inf` if"
+        " there is none.",
+        better="higher",
+    ),
+    Metric(
+        momentum_error,
+        "1",
+        (ITSELF,),
+        "Momentum, largest error",
+        "Largest |P(t) - P(0) - outer impulse| where that impulse is known, over the momentum at"
+        " hand.",
+    ),
+    Metric(
+        momentum_deviation,
+        "1",
+        BESIDE,
+        "Momentum, root mean square",
+        "Root mean square distance of the momentum from the truth's range within 3.2 steps, over"
+        " the momentum at hand.",
+    ),
+    Metric(
+        angular_momentum_error,
+        "1",
+        (ITSELF,),
+        "Angular momentum, largest error",
+        "Largest |L(t) - L(0) - outer angular impulse|, about the scene's centre of mass, over the"
+        " angular momentum at hand.",
+    ),
+    Metric(
+        energy_error,
+        "1",
+        (ITSELF, TRUTH),
+        "Energy, largest error",
+        "Largest |E(t) - E(0)| where nothing takes energy (e = 1, no friction, no thrust), else"
+        " distance from the truth's range within 3.2 steps; over the energy at hand. The note says"
+        " whether it is gained or lost.",
+    ),
+    Metric(
+        energy_deviation,
+        "1",
+        BESIDE,
+        "Energy, root mean square",
+        "Root mean square distance of the energy from the truth's range within 3.2 steps, over the"
+        " energy at hand.",
+    ),
+    Metric(
+        energy_created,
+        "1",
+        (ITSELF,),
+        "Energy created",
+        "Largest rise of the energy above an earlier sample, over the energy at hand, beyond what"
+        " half a step of gravity changes; no collision creates energy.",
+    ),
+    Metric(
+        collisions.apex_change,
+        "%",
+        (ITSELF,),
+        "Apex of a bounce, higher or lower than stated",
+        "Mean change of the height of a disk's apex from one bounce on a level floor to the next,"
+        " beyond the e2 that the scene states: above 0 the disk comes too high, below 0 not high"
+        " enough. Of the disk with the largest.",
+        better="zero",
+    ),
+    Metric(
+        energy_loss_error,
+        "1",
+        (TRUTH,),
+        "Energy lost, minus that of the exact answer",
+        "Energy lost by the last judged sample, minus what the truth loses within 3.2 steps of it;"
+        " over the energy at hand.",
+        better="zero",
+    ),
+    Metric(
+        collisions.restitution,
+        "1",
+        (ITSELF,),
+        "Restitution measured",
+        "Median e = -(dv after).n / (dv before).n over the collisions that can be read off the"
+        " samples; where gravity leaves a range of e, its value nearest to what the scene states."
+        " Where a tenth or more bounce and a tenth or more do not (e below 0.05), the median of"
+        " those that are farther from what the scene states; the note has the share and the range.",
+        better="as stated",
+    ),
+    Metric(
+        collisions.restitution_error,
+        "1",
+        (ITSELF,),
+        "Restitution, largest error",
+        "Largest |e - what the scene states| over the collisions that can be read off the samples,"
+        " beyond what gravity leaves open.",
+    ),
+    Metric(
+        penetration_radii,
+        "radii",
+        (ITSELF,),
+        "Deepest overlap",
+        "Largest overlap in any sample, in radii of the smaller disk.",
+    ),
+    Metric(
+        disks_tunnelled,
+        "disks",
+        (ITSELF,),
+        "Disks that tunnelled through a wall",
+        "Number of disks whose centre has crossed a wall between two samples, and had no time to"
+        " go round its end (tunnelling). A wrap crosses nothing.",
+    ),
+    Metric(
+        collisions.collision_count_error,
+        "collisions",
+        BESIDE,
+        "Collisions, too many or too few",
+        "Number of collisions minus that of the truth, or of the other engine, at any time; pairs"
+        " at rest from the start are not counted.",
+        better="zero",
+    ),
+    Metric(
+        collisions.collisions_missed,
+        "collisions",
+        BESIDE,
+        "Collisions missed",
+        "Collisions of the truth, or of the other engine, that the engine does not have at that"
+        " time. Collisions closer together than a step can resolve are not counted. Of a pair that"
+        " collides seldom one counts as found up to half of the time to its next collision; the"
+        " note has how many are more than 20 steps late or early.",
+    ),
+    Metric(
+        collisions.collisions_spurious,
+        "collisions",
+        BESIDE,
+        "Collisions spurious",
+        "Collisions of the engine that the truth, or the other engine, does not have at their"
+        " time; and one if a disk that lies, slides or rolls on a floor of several walls is thrown"
+        " off it.",
+    ),
+    Metric(
+        collisions.first_wrong_collision_s,
+        "s",
+        BESIDE,
+        "Time of the first wrong collision",
+        "Time of the first missed or spurious collision, and its pair; `inf` if there is none.",
+        better="higher",
+    ),
+    Metric(
+        collisions.collision_delay_dt,
+        "dt",
+        BESIDE,
+        "Detection delay, median",
+        "Median of engine time minus true time of the collisions, in dt; the engine time is the"
+        " end of the step.",
+        better="zero",
+    ),
+    Metric(
+        collisions.collision_delay_max_dt,
+        "dt",
+        BESIDE,
+        "Detection delay, largest",
+        "Largest difference in time of any collision from the true one, in dt.",
+    ),
+    Metric(
+        friction.tangential_velocity_error,
+        "m/s",
+        (TRUTH,),
+        "Tangential velocity after a collision, largest error",
+        "Largest error of a disk's velocity along the surfaces, in the first sample after a"
+        " collision that is more than 3.2 steps from all collisions.",
+    ),
+    Metric(
+        friction.friction_impulse_error,
+        "N s",
+        (TRUTH,),
+        "Impulse of friction in a collision, largest error",
+        "Largest error of the impulse of friction in a collision: I dw / r of a disk, because only"
+        " friction changes its spin.",
+    ),
+    Metric(
+        friction.friction_loss_error,
+        "1",
+        (TRUTH,),
+        "Energy lost to friction in collisions, minus that of the exact answer",
+        "Energy that friction takes in collisions, minus that of the exact answer, over the energy"
+        " at hand.",
+        better="zero",
+    ),
+    Metric(
+        friction.restitution_loss_error,
+        "1",
+        (TRUTH,),
+        "Energy lost to restitution beside friction, minus that of the exact answer",
+        "Energy that restitution takes in collisions with friction, minus that of the exact"
+        " answer, over the energy at hand.",
+        better="zero",
+    ),
+    Metric(
+        friction.time_to_roll_error_s,
+        "s",
+        (TRUTH,),
+        "Time at which a disk begins to roll, minus the exact one",
+        "Time at which a sliding disk begins to roll, minus that of the exact answer; the largest"
+        " of all disks. If it slips to the end, what is left until the end: a lower bound.",
+        better="zero",
+    ),
+    Metric(
+        friction.slip_at_rest,
+        "m/s",
+        (TRUTH,),
+        "Slip where a disk should roll, largest",
+        "Largest speed at which a disk slides on a wall while, in the exact answer, it rolls or"
+        " rests there; counted from 3.2 steps after that begins.",
+    ),
 )
 METRICS = {row.of.__name__: row for row in ROWS}
