@@ -60,17 +60,13 @@ def order_of(dt: Array, errors: Array, changes: Array, seed: int = 0) -> Order:
     if used.sum() < 3:
         return Order(np.nan, np.nan, np.nan, verdict if verdict != ORDER else UNKNOWN)
     x = np.log(dt[used])
-    if len(errors) == 1:
-        fitted, low, high = line_interval(x, np.log(middle[used]))
-        return Order(fitted, low, high, confirmed(verdict, low))
-    logs = np.log(np.maximum(errors[:, used], FINEST))
-    low, high = bootstrap(logs, lambda sample: slope(x, np.median(sample, axis=0)), seed)
-    return Order(slope(x, np.log(middle[used])), low, high, confirmed(verdict, low))
-
-
-def confirmed(verdict: str, low: float) -> str:
-    """The verdict; `UNCLEAR` if the error falls but the interval of the slope includes 0."""
-    return UNCLEAR if verdict == ORDER and not low > 0 else verdict
+    fitted, low, high = line_interval(x, np.log(middle[used]))
+    if len(errors) > 1:
+        logs = np.log(np.maximum(errors[:, used], FINEST))
+        low, high = bootstrap(logs, lambda sample: slope(x, np.median(sample, axis=0)), seed)
+    if verdict == ORDER and not low > 0:  # it falls, but the interval of the slope includes 0
+        verdict = UNCLEAR
+    return Order(fitted, low, high, verdict)
 
 
 def verdict_of(errors: Array, changes: Array) -> str:

@@ -6,6 +6,7 @@ Each is a row of `METRICS` (metrics.py), with the sentence that says what it is.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -163,17 +164,17 @@ def first_wrong_collision_s(view: View) -> Value | None:
 
 
 def collision_delay_dt(view: View) -> Value | None:
-    delay = view.matched.delay
-    return _in_dt(np.median(delay), view) if len(delay) else None
+    return _delay(view, np.median)
 
 
 def collision_delay_max_dt(view: View) -> Value | None:
+    return _delay(view, lambda delay: np.abs(delay).max())
+
+
+def _delay(view: View, of: Callable[[Array], Any]) -> Value | None:
     delay = view.matched.delay
-    return _in_dt(np.abs(delay).max(), view) if len(delay) else None
-
-
-def _in_dt(delay: Any, view: View) -> Value:
-    return Value(float(delay) / view.dt, note=f"{len(view.matched.delay)} collisions")
+    note = f"{len(delay)} collisions"
+    return Value(float(of(delay)) / view.dt, note=note) if len(delay) else None
 
 
 def _carried(view: View) -> str:

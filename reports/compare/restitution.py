@@ -76,9 +76,15 @@ def effective_restitution(
     i, j = collisions.i, collisions.j
     fixed = scene.static[i]  # then the second is the disk that moves
     every = Pairs(before, np.where(fixed, j, i), np.where(fixed, i, j), collisions.t)
-    reader = Reader(trajectory, scene, rounding, in_intervals(every, len(t), scene.n))
+    count = np.zeros((len(t) + 2, scene.n), np.int64)
+    disks = every.of(every.j >= 0)
+    np.add.at(count, (every.k + 1, every.i), 1)
+    np.add.at(count, (disks.k + 1, disks.j), 1)
+    reader = Reader(trajectory, scene, rounding, count)
     within = every.of((before >= 0) & (before < len(t) - 1) & (every.i >= 0))
-    read = within.of(reader.is_alone(within))
+    k, both = within.k[:, None], within.disks
+    alone = (count[k + 1, both] == 1) & (count[k + 2, both] == 0)  # in the interval and the next
+    read = within.of(alone.all(axis=1))
     noise = reader.is_rounding(read)
     read = read.of(~noise)
     after, held = reader.first_apart(read)
@@ -139,31 +145,15 @@ class Pairs(NamedTuple):
         return np.asarray(~scene.static[self.disks] & is_disk)
 
 
-def in_intervals(every: Pairs, samples: int, n: int) -> np.ndarray:
-    """(samples + 2, n) number of collisions of each disk: in row k + 1 after sample k, in row 0
-    before the first sample."""
-    count = np.zeros((samples + 2, n), np.int64)
-    np.add.at(count, (every.k + 1, every.i), 1)
-    disks = every.of(every.j >= 0)
-    np.add.at(count, (disks.k + 1, disks.j), 1)
-    return count
-
-
 @dataclass(frozen=True, eq=False)
 class Reader:
-    """Reads collisions off a trajectory; `count` as from `in_intervals`. A sample k is (m,), one
-    for each pair."""
+    """Reads collisions off a trajectory. A sample k is (m,), one for each pair."""
 
     trajectory: Trajectory
     scene: Scene
     rounding: float
+    # (samples + 2, n) collisions of each disk: in row k + 1 after sample k, in row 0 before them
     count: np.ndarray
-
-    def is_alone(self, pairs: Pairs) -> np.ndarray:
-        """(m,) whether neither disk has another collision in the same interval or the next."""
-        k, disks = pairs.k[:, None], pairs.disks
-        alone = (self.count[k + 1, disks] == 1) & (self.count[k + 2, disks] == 0)
-        return np.asarray(alone.all(axis=1))
 
     def first_apart(self, read: Pairs) -> tuple[np.ndarray, Array]:
         """(m,) the first sample after each collision at which the two do not approach, or are held;

@@ -191,7 +191,6 @@ def suite_case(name: str, whole: Scenario) -> Case:
         runs=SEEDS if name in RANDOM else 1,
         ratio=1.2,
         refines=False,
-        report=name,
     )
 
 

@@ -60,7 +60,7 @@ def find_limits(
         how += " crosscheck run plays it"
         refuse([f"--engine {file}: {how}" for file in files])
     form, count = "full" if full else "quick", affordable(workers or os.cpu_count() or 1)
-    plan = StabilityPlan(names, chosen, form, count, command)
+    plan = StabilityPlan(names, chosen, form, count, command, added)
     with taking_part(added):
         if not plan.tasks() and {*chosen} <= {*WITH_FRICTION_ONLY}:
             refuse([f"--engine {name}: plays as {ENGINES[name].bits_of} here" for name in chosen])

@@ -140,8 +140,6 @@ class Case:
     # worst of it depends on what is sampled
     by_chance: float = 0.0
     shown_with: str = EXACT  # what a failing run is shown with
-    # a scene of the report that asks something alike; `in_report` says how the two differ
-    report: str = ""
 
     @property
     def harsher(self) -> int:

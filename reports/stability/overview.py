@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 
 from crosscheck2d.adapters.engines import ENGINES
-from crosscheck2d.reports.page.scenes import LOST, is_library
+from crosscheck2d.reports.page.scenes import is_library
 from crosscheck2d.reports.page.style import number
 from crosscheck2d.reports.stability import cases_few
 from crosscheck2d.reports.stability.limits import (
@@ -26,8 +26,6 @@ from crosscheck2d.reports.stability.limits import (
 )
 from crosscheck2d.reports.stability.predicates import REFUSED
 from crosscheck2d.reports.terminal.counts import counted, listed
-from crosscheck2d.scenarios.catalogue import scenario
-from crosscheck2d.scenarios.model import Scenario
 
 WORDS: dict[str, Any] = tomllib.loads(
     Path(__file__).with_name("words.toml").read_text(encoding="utf-8")
@@ -94,40 +92,20 @@ def held(case: Case) -> dict[str, str]:
     return symbols
 
 
-def in_report(case: Case) -> str:
-    if not case.report:
-        return ""
-    reported, here = scenario(case.report), case.scene(case.values[0], 0)
-    dt, dt_here = number(1e3 * reported.dt(reported.middle_substeps)), held(case).get("dt")
-    same = np.array_equal(reported.scene.position, here.scene.position)
-    text: str = WORDS["same_scene" if same else "other_scene"].format(
-        name=case.report,
-        dt=dt,
-        varies=f"dt is {dt_here}" if dt_here else "dt is varied",
-        there=setting(reported),
-        here=setting(here),
-    )
-    return text + str(WORDS["in_report"].format(number(LOST), case.predicate.means))
-
-
-def setting(scene: Scenario) -> str:
-    return f"{counted(len(scene.scene.walls), 'wall')} for {number(scene.duration)} s"
-
-
 def findings(limits: Sequence[Limit]) -> list[str]:
     limits = [limit for limit in limits if limit.engine in ENGINES]
-    columns = "case engine failed nowhere refused tested lost friction"
     table = pd.DataFrame(
-        [
-            (
-                *(limit.case, limit.engine, limit.verdict != NEVER_FAILS),
-                *(limit.verdict == NEVER_WORKS, limit.refused),
-                *(bool(limit.cause and limit.cause.shown), limit.status != "ok"),
-                limit.case in cases_few.SCENES_WITH_FRICTION,
-            )
-            for limit in limits
-        ],
-        columns=columns.split(),
+        {
+            "case": limit.case,
+            "engine": limit.engine,
+            "failed": limit.verdict != NEVER_FAILS,
+            "nowhere": limit.verdict == NEVER_WORKS,
+            "refused": limit.refused,
+            "tested": bool(limit.cause and limit.cause.shown),
+            "lost": limit.status != "ok",
+            "friction": limit.case in cases_few.SCENES_WITH_FRICTION,
+        }
+        for limit in limits
     )
     failed, limited = int(table.failed.sum()), table.failed & ~table.refused
     sentences = [

@@ -42,7 +42,6 @@ from crosscheck2d.reports.stability.overview import (
     bracket,
     findings,
     held,
-    in_report,
     in_words,
     where_it_works,
     why,
@@ -162,12 +161,7 @@ def facts(case: Case) -> list[str]:
     fails = predicate.name, predicate.means, above(predicate)
     runs = WORDS["runs"].format(case.runs) if case.runs > 1 else WORDS["one_run"]
     runs += WORDS["by_chance"].format(round(1 / case.by_chance)) if case.by_chance else ""
-    report = in_report(case)
-    return [
-        WORDS["fails"].format(case.with_unit(case.parameter), *ends, *fails),
-        f"{runs}.",
-        *([f"In the report: {report}"] if report else []),
-    ]
+    return [WORDS["fails"].format(case.with_unit(case.parameter), *ends, *fails), f"{runs}."]
 
 
 def above(predicate: Predicate) -> str:

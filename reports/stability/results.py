@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import closing
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from math import nan
 from typing import Any, NamedTuple
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
 from crosscheck2d.adapters.engine_row import EngineRow
-from crosscheck2d.adapters.engines import ENGINES, FETCHED, NAMED, OWN, parsed
+from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.adapters.npm_packages import version_of
 from crosscheck2d.reports.page.replay import COLLISIONS, Layers, pack_layers, ratio_of
 from crosscheck2d.reports.run.cells import about, content_key, source_hash
@@ -119,15 +119,8 @@ class StabilityPlan:
     form: str
     workers: int = 1
     command: str = ""
-
-    @property
-    def added(self) -> dict[str, EngineRow]:
-        # engines' own files, fetched packages and other versions
-        return {
-            name: ENGINES[name]
-            for name in self.engines
-            if name.endswith(OWN) or name in FETCHED | NAMED or parsed(name)[1]
-        }
+    # engines' own files, fetched packages and other versions
+    added: Mapping[str, EngineRow] = field(default_factory=dict)
 
     @property
     def versions(self) -> dict[str, str]:

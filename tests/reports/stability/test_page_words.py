@@ -1,17 +1,13 @@
-"""What the page of limits says beside its numbers: what a case keeps, and how the report asks."""
+"""What the page of limits says beside its numbers: what a case keeps."""
 
 from __future__ import annotations
 
 import pytest
 
-from crosscheck2d.reports.page.scenes import LOST
 from crosscheck2d.reports.page.style import number
 from crosscheck2d.reports.stability.cases import CASES
 from crosscheck2d.reports.stability.limits import LIMIT, Case, Limit, Trial
-from crosscheck2d.reports.stability.overview import findings, held, in_report, in_words
-from crosscheck2d.scenarios.catalogue import scenario
-
-COLUMN = "column_of_ten"
+from crosscheck2d.reports.stability.overview import findings, held, in_words
 
 
 def played_with(case: Case, value: float) -> tuple[str, set[str]]:
@@ -46,16 +42,3 @@ def test_what_a_case_varies_is_not_said_to_be_kept():
     assert held(CASES["bounce_drift"]) == {"R": "0.25 m"}
     assert list(held(CASES["scale_down"])) == ["dt"]
     assert held(CASES["dt_galperin_314"]) == {"R": "0.25 to 0.5 m"}
-
-
-def test_the_column_of_the_report_and_that_of_the_limits_are_told_apart():
-    one, mine = scenario(COLUMN), CASES["column"].scene(10, 0)
-    said, same = in_report(CASES["column"]), in_report(CASES[f"dt_{COLUMN}"])
-
-    dt = number(1e3 * one.dt(one.middle_substeps))
-    assert f"{len(one.scene.walls)} wall for {number(one.duration)} s, at dt {dt} ms" in said
-    assert f"here {len(mine.scene.walls)} walls for {number(mine.duration)} s" in said
-    assert f"dt is {held(CASES['column'])['dt']}" in said
-    assert f"more than {number(LOST)} radius" in said
-    assert CASES["column"].predicate.means in said
-    assert f"{COLUMN} is the same scene, at dt {dt} ms; here dt is varied." in same
