@@ -105,7 +105,9 @@ def tune(engines: Sequence[str], fresh: bool, out: Path) -> NoReturn:
 
 def show(table: pd.DataFrame) -> None:
     tried = table[table.verdict != NO_SEARCH]
-    numbers = tried[["equal_cost", "cost", "harmed"]].map("{:.3g}".format).replace("nan", "")
+    # harmed is text where a row has none
+    numbers = tried[["equal_cost", "cost", "harmed"]].apply(pd.to_numeric, errors="coerce")
+    numbers = numbers.map("{:.3g}".format).replace("nan", "")
     names = tried.engine + ", " + tried.setting + ": " + tried.value
     rows = pd.concat([names, numbers, tried.verdict], axis=1).to_numpy().tolist()
     headings = ["setting", "error", "cost\nof a step", "runs\nworse", "verdict"]

@@ -149,7 +149,8 @@ def increases(now: Array, before: Array) -> NDArray[np.bool_]:
 def changes(now: TrialScores, before: TrialScores) -> NDArray[np.int64]:
     """(s, k) 1 where a run gets worse, -1 where it gets better, 0 where neither or both."""
     worse, better = increases(now.harm, before.harm), increases(before.harm, now.harm)
-    return np.sign(worse.sum(axis=2) - better.sum(axis=2))
+    change: NDArray[np.int64] = np.sign(worse.sum(axis=2) - better.sum(axis=2))
+    return change
 
 
 def faults_of(now: TrialScores, before: TrialScores, scenes: Sequence[Asked]) -> list[str]:

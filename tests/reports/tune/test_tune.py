@@ -26,6 +26,7 @@ from crosscheck2d.reports.tune.command import (
     SettingsSearch,
     format_value,
     searched_of,
+    show,
 )
 from crosscheck2d.reports.tune.score import (
     FLOOR,
@@ -90,6 +91,15 @@ def test_every_value_of_the_grid_is_in_the_table_and_every_reason_is_given():
         assert all(set(names) <= set(what.settings) for names, *_ in what.pairs)
     assert all(row["why"] for row in TABLE if row["verdict"] in (CHOSEN, NO_SEARCH))
     assert not [row for row in TABLE if row["verdict"] == BETTER]  # the last sweep took nothing
+
+
+def test_the_table_is_printed_with_what_is_chosen_and_tried(capsys: pytest.CaptureFixture[str]):
+    show(pd.DataFrame(TABLE[:9]))
+    printed = capsys.readouterr().out
+
+    assert f"{TABLE[0]['engine']}, {TABLE[0]['setting']}: {TABLE[0]['value']}" in printed
+    assert CHOSEN in printed
+    assert NO_SEARCH not in printed
 
 
 def test_the_tuning_scenes_are_not_those_of_the_suite():
