@@ -182,18 +182,13 @@ def advise(
         file.write_text(scene_text(scenario), encoding="utf-8")
         try:
             requirement = Requirement(str(file), 0, purpose, error)
-            advice = Inquiry(requirement, os.cpu_count() or 1, progress).advise(names)
+            answer = Inquiry(requirement, os.cpu_count() or 1, progress).advise(names)
         except NoAdvice as refusal:
             raise ValueError(str(refusal)) from None
-    tried = [(attempt, "") for attempt in advice.keeping]
-    tried += [(attempt, attempt.reason) for attempt in advice.partial]
-    tried += [(short.best, short.reason) for short in advice.short]
-    rows = [
-        (attempt.name, attempt.dt, attempt.error, attempt.cost * 1e6, reason)
-        for attempt, reason in tried
-    ]
+    keeping = sorted(answer["cheapest_first"], key=lambda row: row["us_per_simulated_s"])
+    rows = [*keeping, *answer["not_to_the_end"], *answer["not_within"]]
     columns = ["engine", "dt_s", "error", "us_per_simulated_s", "not_advised"]
-    return pd.DataFrame(rows, columns=columns)
+    return pd.DataFrame([row | {"not_advised": row.get("why", "")} for row in rows])[columns]
 
 
 @contextmanager

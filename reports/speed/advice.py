@@ -22,7 +22,7 @@ from crosscheck2d.adapters.play import play_once
 from crosscheck2d.reports.compare.accuracy import kept_from
 from crosscheck2d.reports.compare.delays import jumps_of
 from crosscheck2d.reports.compare.verdicts import first_failed
-from crosscheck2d.reports.compare.view import View, beside, cut
+from crosscheck2d.reports.compare.view import beside, cut
 from crosscheck2d.reports.page.style import number
 from crosscheck2d.reports.run.cells import busy_cores
 from crosscheck2d.reports.run.playing import LOADING, clocked
@@ -60,6 +60,7 @@ HALF = 0.5  # with at most this part of the error an option counts as more accur
 STATISTICS = "statistics"
 FOURTH = 4  # an option is played from every fourth start: there are more options than engines
 LASTING = ("trajectory", "energy")  # purposes whose error only grows: it is kept until an instant
+Answer = dict[str, Any]
 
 
 class NoAdvice(Exception):
@@ -74,7 +75,7 @@ class Attempt:
     change: str  # a row of `OPTIONS`, or `PLAIN`
     substeps: int  # steps in a sample interval
     dt: float  # s
-    error: float  # of the purpose; inf where the run failed, nan where it cannot be judged
+    error: float = nan  # of the purpose; inf where the run failed, nan where it cannot be judged
     reason: str = ""  # why it failed
     until: float = nan  # s up to which it keeps the error; nan where that is not known
     starts: tuple[float, ...] = ()  # errors from `starts_within_a_step`; () where not played
@@ -98,8 +99,7 @@ class Attempt:
     @property
     def usually(self) -> float:
         """The error that nine tenths of the starts keep; nan where these were not played."""
-        count = ceil(NINE_TENTHS * len(self.starts))
-        return sorted(self.starts)[count - 1] if count else nan
+        return sorted(self.starts)[most_of(self.starts) - 1] if self.starts else nan
 
     def kept_in(self, bound: float) -> int:
         return sum(error <= bound for error in self.starts)
@@ -117,38 +117,29 @@ class Requirement(NamedTuple):
     purpose: str
     bound: float
 
-    def play(self, attempt: Attempt) -> Attempt:
-        return self.play_part(scored(self.scene, self.seed), attempt)
-
-    def play_part(self, part: Scored, attempt: Attempt) -> Attempt:
-        """The attempt with its error in a part of the scene, and until when, s, it keeps the
-        bound."""
-        scenario, truth = part
+    def play(self, attempt: Attempt, part: Scored | None = None) -> Attempt:
+        """The attempt with its error in a part of the scene, by default in all that has an exact
+        answer, and until when, s, it keeps the bound."""
+        scenario, truth = part or scored(self.scene, self.seed)
         allow(LOADING)  # a kernel's first compilation is no time of an engine
         run = play_once(attempt.make, attempt.name, scenario, attempt.dt, clocked())
-        until = nan
+        error, until = PURPOSES[self.purpose].error, nan
         if run.trajectory is not None and len(run.trajectory) > 1:
             jumps = jumps_of(truth, scenario) if self.purpose == "energy" else None
             view = beside(scenario, run, truth, jumps)
-            until = self.kept_until(view) if self.purpose in LASTING else nan
+            if self.purpose in LASTING:
+                low, high = 1, len(view.played)  # samples: the start is given
+                while low < high:  # bisection, as the error only grows
+                    k = (low + high + 1) // 2
+                    early = replace(view, played=cut(view.played, k), other=cut(truth, k))
+                    low, high = (low, k - 1) if error(early) > self.bound else (k, high)
+                until = float(view.played.t[low - 1])
         if run.status != "ok" or run.trajectory is None:
             failure = f"{run.status}: {run.reason}"
             return replace(attempt, error=inf, reason=failure, until=until)
-        error = PURPOSES[self.purpose].error(view)
-        reason = "" if not isnan(error) else "too little of it can be judged"
-        return replace(attempt, error=error, reason=reason, until=until)
-
-    def kept_until(self, view: View) -> float:
-        """s, the last sample up to which a run keeps the bound; found by bisection, as its error
-        only grows."""
-        assert view.other is not None
-        low, high = 1, len(view.played)  # samples: the start is given
-        while low < high:
-            k = (low + high + 1) // 2
-            early = replace(view, played=cut(view.played, k), other=cut(view.other, k))
-            far_off = PURPOSES[self.purpose].error(early) > self.bound
-            low, high = (low, k - 1) if far_off else (k, high)
-        return float(view.played.t[low - 1])
+        value = error(view)
+        reason = "too little of it can be judged" if isnan(value) else ""
+        return replace(attempt, error=value, reason=reason, until=until)
 
     def play_starts(self, attempt: Attempt, every: int = 1) -> Attempt:
         """The attempt with its errors from every `every`-th of the starts within a step, and until
@@ -157,13 +148,13 @@ class Requirement(NamedTuple):
         whole = scored(self.scene, self.seed).scenario.duration
         starts = starts_within_a_step(self.scene, self.seed, attempt.dt)
         for begin, part in islice(starts, 0, None, every):
-            played = self.play_part(part, attempt)
+            played = self.play(attempt, part)
             errors.append(played.error)
             keeps = played.error <= self.bound
             until.append(whole if keeps else played.until and begin + played.until)
-        count = len(errors) - ceil(NINE_TENTHS * len(errors))
-        lasting = float(np.sort(np.nan_to_num(until, nan=0.0))[count])
-        lasting = lasting if self.purpose in LASTING else nan
+        lasting = nan
+        if self.purpose in LASTING:
+            lasting = float(np.sort(np.nan_to_num(until))[len(until) - most_of(until)])
         return replace(attempt, starts=tuple(errors), lasting=lasting)
 
     def play_to_the_end(self, attempt: Attempt) -> Attempt:
@@ -184,182 +175,94 @@ class Requirement(NamedTuple):
         return cause_of(self.scene, self.seed, name, substeps, self.purpose, self.bound)
 
 
-class ChangedOption(NamedTuple):
-    """An engine without a change of an option, and with it, at the same step size."""
-
-    plain: Attempt
-    changed: Attempt
-
-    @property
-    def errors(self) -> tuple[float, float]:
-        """The medians over the starts that both were played from."""
-        every = len(self.plain.starts) // len(self.changed.starts)
-        return float(np.median(self.plain.starts[::every])), float(np.median(self.changed.starts))
-
-    def verdict(self, bound: float, floor: float) -> str:
-        """The effect of the change: on the error, or else on the cost, if the cost changes by more
-        than the fraction `floor`; inf where costs cannot be compared."""
-        if not self.changed.holds(bound):
-            return TOO_FAR_OFF
-        if self.changed.cost / self.plain.cost < 1 - floor:
-            return SAVES_TIME
-        before, after = self.errors
-        if after <= HALF * before:
-            return NEARER
-        return NO_GAIN if isfinite(floor) else NOT_COMPARED
-
-
-class OutOfReach(NamedTuple):
-    """An engine that does not keep the error to the end: its best attempt, its error at the finest
-    step size, the attempts at the usual step size and at the one that keeps it longest, and the
-    reason."""
-
-    best: Attempt
-    finest: float
-    usual: Attempt
-    longest: Attempt
-    reason: str
-
-
-@dataclass(frozen=True)
-class Advice:
-    """The result of `Inquiry.advise`.
-
-    keeping: for every engine that keeps the error and plays the whole scene without failing a
-        verdict, the coarsest step size that does from nine tenths of the starts within a step, too,
-        and keeps the error at every finer one; cheapest first.
-    short: the engines that do not keep it.
-    partial: those that keep it where it is judged, but do not play the whole scene, or fail a
-        verdict in it at every step size that keeps it; with the reason.
-    """
-
-    scene: str
-    purpose: str
-    bound: float
-    until: float  # s, up to where errors are judged
-    duration: float  # s, of the scene
-    collisions: int  # of the exact answer, that are judged
-    step_sizes: Sequence[float]  # s, those that were tried, coarse to fine
-    keeping: Sequence[Attempt]
-    short: Sequence[OutOfReach]
-    partial: Sequence[Attempt]
-    changes: Sequence[ChangedOption]  # of the engines that keep it, one option at a time
-    noise: float  # the upper quartile of |log(cost / cost of its own copy)| over the engines
-    busy: float  # cores that others kept busy when the timing began; nan where unknown
-    statistics: Advice | None = None  # for averages over time, where no library keeps the error
-
-    @property
-    def judged(self) -> str:
-        early = self.until < self.duration and not self.collisions
-        part = f"up to {number(self.until)} of {number(self.duration)} s"
-        return f"{part}, before any collision" if early else part
-
-    @property
-    def quiet(self) -> bool:
-        return self.noise <= LOUD and not self.busy > BUSY
-
-    @property
-    def floor(self) -> float:
-        """The fraction by which two costs must differ to be compared; inf where none can be."""
-        return max(self.noise, LOUD) if self.quiet else inf
-
-    @property
-    def ranked(self) -> list[tuple[int, Attempt]]:
-        """(rank, attempt) of `keeping`, the libraries first: those that cost at most `floor` more
-        than the first of a rank have the same rank."""
-        rows = list[tuple[int, Attempt]]()
-        for library in (True, False):
-            rank, least = 0, -inf
-            group = [attempt for attempt in self.keeping if attempt.is_library is library]
-            for k, attempt in enumerate(group, 1):
-                if not attempt.cost <= least * (1 + self.floor):
-                    rank, least = k, attempt.cost
-                rows.append((rank, attempt))
-        return rows
-
-
 @dataclass(frozen=True)
 class Inquiry:
-    """Which engine meets a requirement at the least cost.
-
-    Raises:
-        NoAdvice: the scene has no exact answer.
-    """
+    """Which engine meets a requirement at the least cost."""
 
     requirement: Requirement
     workers: int
     progress: Progress
 
-    def __post_init__(self) -> None:
-        scene, seed, *_ = self.requirement
-        try:
-            scored(scene, seed)
-        except NoTruth as refusal:
-            raise NoAdvice(
-                f"no exact answer: {refusal}. To compare the engines with each other and with the"
-                f" laws of physics: crosscheck run {shlex.quote(scene)}"
-            ) from refusal
-
-    @property
-    def part(self) -> Scored:
-        return scored(self.requirement.scene, self.requirement.seed)
-
     @property
     def ladder(self) -> tuple[int, ...]:
-        scenario = self.part.scenario
+        scenario, _ = scored(self.requirement.scene, self.requirement.seed)
         return doublings(scenario, MOST_WORK // max(scenario.scene.n, FEW))
 
-    def advise(self, names: Sequence[str]) -> Advice:
-        """Which of the engines `names` keeps the error at the least cost.
+    def advise(self, names: Sequence[str]) -> Answer:
+        """Which of the engines `names` keeps the error at the least cost: what `--json` prints,
+        with nan or inf for what is not a number there.
 
         Every engine is played at every step size of the scene's ladder, up to the horizon of the
         exact answer. Those that keep the error play the whole scene, and from several instants of
         a step; then they are timed, together with their options, alone on the machine.
 
+        The answer has, among others:
+            cheapest_first: for every engine that keeps the error and plays the whole scene without
+                failing a verdict, the coarsest step size that does from nine tenths of the starts
+                within a step, too, and keeps the error at every finer one; the libraries first.
+            not_within: the engines that do not keep it.
+            not_to_the_end: those that keep it where it is judged, but do not play the whole scene,
+                or fail a verdict in it at every step size that keeps it.
+            changes: of the engines that keep it, one option at a time; medians: the errors without
+                the change and with it, over the starts that both were played from.
+            noise: the upper quartile of |log(cost / cost of its own copy)| over the engines.
+            cores_busy: by others when the timing began.
+            statistics: the answer for averages over time, where no library keeps the error.
+
         Raises:
-            NoAdvice: the timing failed.
+            NoAdvice: the scene has no exact answer, or the timing failed.
         """
-        requirement, (scenario, truth) = self.requirement, self.part
-        bound = requirement.bound
+        scene, seed, purpose, bound = self.requirement
+        try:
+            scenario, truth = scored(scene, seed)
+        except NoTruth as refusal:
+            raise NoAdvice(
+                f"no exact answer: {refusal}. To compare the engines with each other and with the"
+                f" laws of physics: crosscheck run {shlex.quote(scene)}"
+            ) from refusal
         tried = self.attempts((name, PLAIN, k) for name in names for k in self.ladder)
         ladders = {name: [each for each in tried if each.name == name] for name in names}
-        keeping, partly, unsteady = self.confirmed(
-            [rest for each in ladders.values() if (rest := those_that_keep(each, bound))]
-        )
+        able = [rest for each in ladders.values() if (rest := those_that_keep(each, bound))]
+        keeping, partly, unsteady = self.confirmed(able)
         at = {attempt.name: attempt.substeps for attempt in keeping}
         changed = (x for x in OPTIONS if x.engine in at)
         optional = self.attempts((x.engine, x.change, at[x.engine]) for x in changed)
-        able, _ = self.to_the_end(self.from_every_start(optional, FOURTH))
-        priced, differences, busy = self.timed([*keeping, *able])
+        options, _ = self.to_the_end(self.from_every_start(optional, FOURTH))
+        priced, differences, busy = self.timed([*keeping, *options])
+        noise = float(np.percentile([*differences.values()], 75)) if differences else nan
         plain = {attempt.name: attempt for attempt in priced if attempt.change == PLAIN}
         ended = {attempt.name for attempt in (*keeping, *partly)}
-        advice = Advice(
-            scenario.name,
-            requirement.purpose,
-            bound,
-            scenario.duration,
-            open_scene(requirement.scene, requirement.seed).duration,
-            len(truth.collisions),
-            [scenario.dt(k) for k in self.ladder],
-            sorted(plain.values(), key=lambda attempt: attempt.cost),
-            self.out_of_reach(
-                [ladder for name, ladder in ladders.items() if name not in ended],
-                {attempt.name: attempt for attempt in unsteady},
-            ),
-            partly,
-            [ChangedOption(plain[each.name], each) for each in priced if each.change != PLAIN],
-            float(np.percentile([*differences.values()], 75)) if differences else nan,
-            busy,
-        )
+        others = {name: ladder for name, ladder in ladders.items() if name not in ended}
+        floor = floor_of(noise, busy)
+        answer = {
+            "scenario": scenario.name,
+            "purpose": purpose,
+            "error_at_most": bound,
+            "until_s": scenario.duration,
+            "duration_s": open_scene(scene, seed).duration,
+            "collisions_judged": len(truth.collisions),
+            "dt_s_tried": [scenario.dt(k) for k in self.ladder],
+            "cheapest_first": ranked_rows([*plain.values()], bound, floor),
+            "not_within": self.out_of_reach(others, {each.name: each for each in unsteady}),
+            "not_to_the_end": [as_row(each) | {"why": each.reason} for each in partly],
+            "changes": [
+                change_row(plain[each.name], each, bound, floor)
+                for each in priced
+                if each.change != PLAIN
+            ],
+            "noise": noise,
+            "cores_busy": busy,
+            "statistics": None,
+        }
         libraries = [name for name, (first, *_) in ladders.items() if first.is_library]
-        if requirement.purpose == STATISTICS or not libraries or at.keys() & set(libraries):
-            return advice
-        averages = replace(self, requirement=requirement._replace(purpose=STATISTICS))
-        return replace(advice, statistics=averages.advise(libraries))
+        if purpose != STATISTICS and libraries and not at.keys() & set(libraries):
+            averages = replace(self, requirement=self.requirement._replace(purpose=STATISTICS))
+            answer["statistics"] = averages.advise(libraries)
+        return answer
 
     def attempts(self, asked: Iterable[tuple[str, str, int]]) -> list[Attempt]:
-        dt = self.part.scenario.dt
-        wanted = [Attempt(name, change, k, dt(k), nan) for name, change, k in asked]
+        dt = scored(self.requirement.scene, self.requirement.seed).scenario.dt
+        wanted = [Attempt(name, change, k, dt(k)) for name, change, k in asked]
         return self.outcomes(wanted, self.requirement.play, "playing", error=inf)
 
     def from_every_start(self, wanted: Sequence[Attempt], every: int = 1) -> list[Attempt]:
@@ -410,14 +313,13 @@ class Inquiry:
                 else:
                     unsteady.append(attempt)
             for attempt in failed:
-                at_dt = attempt.reason
-                if attempt.broken:
-                    at_dt += f" (dt {number(attempt.dt * 1e3)} ms)"
-                coarse = first.setdefault(attempt.name, at_dt)
+                at_dt = f" (dt {number(attempt.dt * 1e3)} ms)" if attempt.broken else ""
+                reason = attempt.reason + at_dt
+                coarse = first.setdefault(attempt.name, reason)
                 if attempt.broken and attempt.name in finer:
                     again.append(attempt.name)
                 else:
-                    both = dict.fromkeys((coarse, at_dt))
+                    both = dict.fromkeys((coarse, reason))
                     unable.append(replace(attempt, reason="; ".join(both)))
             ladders = [finer[name] for name in again]
         return able, unable, unsteady
@@ -430,9 +332,9 @@ class Inquiry:
         of cores that others used."""
         if not played:
             return [], {}, nan
-        makes = {(attempt.task, attempt.substeps, 0): attempt.make for attempt in played}
-        twice = [attempt for attempt in played if attempt.change == PLAIN]
-        makes |= {(attempt.task, attempt.substeps, 1): attempt.make for attempt in twice}
+        plain = [attempt for attempt in played if attempt.change == PLAIN]
+        copies = [(attempt, 0) for attempt in played] + [(attempt, 1) for attempt in plain]
+        makes = {(each.task, each.substeps, copy): each.make for each, copy in copies}
         scene, seed, *_ = self.requirement
         task = partial(times_of, scene, seed, makes, ROUNDS, BUDGET, whole=True)
         busy = busy_cores()
@@ -443,53 +345,110 @@ class Inquiry:
         cost = dict(zip(times.key, times.cost))
         priced = [replace(each, cost=cost[each.task, each.substeps, 0]) for each in played]
         differences = {
-            (each.name, each.substeps): abs(log(cost[each.task, each.substeps, 1] / each.cost))
-            for each in priced
-            if each.change == PLAIN
+            (each.name, each.substeps): abs(
+                log(cost[each.task, each.substeps, 1] / cost[each.task, each.substeps, 0])
+            )
+            for each in plain
         }
         return priced, differences, busy
 
     def out_of_reach(
-        self, ladders: Sequence[Sequence[Attempt]], unsteady: Mapping[str, Attempt]
-    ) -> list[OutOfReach]:
-        """What each engine, of which all attempts are given, coarse to fine, comes to; until when
-        it keeps the error; and the cause of its error, at the coarsest step that has at most twice
-        its least error."""
-        dt = self.part.scenario.dt(self.part.scenario.middle_substeps)
-        best = [min(each, key=lambda x: inf if isnan(x.error) else x.error) for each in ladders]
-        usual = [next((x for x in each if x.dt <= dt), each[-1]) for each in ladders]
-        longest = [max(each, key=lambda x: (reach(x), x.dt)) for each in ladders]
+        self, ladders: Mapping[str, Sequence[Attempt]], unsteady: Mapping[str, Attempt]
+    ) -> list[Answer]:
+        """A row for each engine, of which all attempts are given, coarse to fine: its least error;
+        until when it keeps the error, at the usual step size and at the one that keeps it longest;
+        and the cause of its error, at the coarsest step that has at most twice the least."""
+        scenario, _ = scored(self.requirement.scene, self.requirement.seed)
+        dt, bound = scenario.dt(scenario.middle_substeps), self.requirement.bound
+        best, usual, longest, tasks = {}, {}, {}, {}
+        for name, ladder in ladders.items():
+            best[name] = min(ladder, key=lambda x: inf if isnan(x.error) else x.error)
+            usual[name] = next((x for x in ladder if x.dt <= dt), ladder[-1])
+            longest[name] = max(ladder, key=lambda x: (-inf if isnan(x.until) else x.until, x.dt))
+            if isfinite(least := best[name].error):
+                at = next(attempt for attempt in ladder if attempt.error <= 2 * least)
+                bits = row_of(name).bits_of or name  # what plays the same
+                tasks[best[name].task] = partial(self.requirement.find_cause, bits, at.substeps)
+        from_starts: dict[Any, Attempt] = {}
         if self.requirement.purpose in LASTING:
-            lasting = dict.fromkeys(x for x in (*usual, *longest) if not isnan(x.until))
-            until = {x.task: x for x in (*self.from_every_start([*lasting]), *unsteady.values())}
-            usual, longest = ([until.get(x.task, x) for x in each] for each in (usual, longest))
-        tasks = {}
-        for least, ladder in zip(best, ladders):
-            if isfinite(least.error):
-                at = next(attempt for attempt in ladder if attempt.error <= 2 * least.error)
-                bits = row_of(least.name).bits_of or least.name  # what plays the same
-                tasks[least.task] = partial(self.requirement.find_cause, bits, at.substeps)
+            both = (pair for name in ladders for pair in (usual[name], longest[name]))
+            lasting = dict.fromkeys(attempt for attempt in both if not isnan(attempt.until))
+            played = self.from_every_start([*lasting])
+            from_starts = {attempt.task: attempt for attempt in (*played, *unsteady.values())}
         causes = do_all(tasks, self.workers, self.progress, "cause of the error", SEARCH)
         rows = []
-        for row in zip(best, (ladder[-1].error for ladder in ladders), usual, longest):
-            name, reason = row[0].name, row[0].reason
+        for name, ladder in ladders.items():
+            reason = best[name].reason
             if not reason:
-                cause = causes[row[0].task]
-                failed = isinstance(cause, Failure)
-                reason = "not known: the search for it did not end" if failed else cause
+                reason = causes[best[name].task]
+                if isinstance(reason, Failure):
+                    reason = "not known: the search for it did not end"
             if name in unsteady:
                 reason = (
                     f"at {number(1e3 * unsteady[name].dt)} ms it keeps the error from"
-                    f" {unsteady[name].kept_in(self.requirement.bound)} of {STARTS} instants of a"
-                    f" step only; {reason}"
+                    f" {unsteady[name].kept_in(bound)} of {STARTS} instants of a step only;"
+                    f" {reason}"
                 )
-            rows.append(OutOfReach(*row, reason))
+            row = as_row(best[name]) | {"error_at_finest": ladder[-1].error}
+            for what, attempt in (("", usual[name]), ("longest_", longest[name])):
+                attempt = from_starts.get(attempt.task, attempt)
+                kept = what or "kept_"
+                row |= {f"{kept}until_s": attempt.until, f"{what}at_dt_s": attempt.dt}
+                row |= {f"{kept}from_nine_tenths_until_s": attempt.lasting}
+            rows.append(row | {"why": reason})
         return rows
 
 
-def reach(attempt: Attempt) -> float:
-    # sort key: until when it keeps the error
-    return -inf if isnan(attempt.until) else attempt.until
+def most_of(starts: Sequence[float]) -> int:
+    return ceil(NINE_TENTHS * len(starts))
+
+
+def as_row(attempt: Attempt) -> Answer:
+    return {
+        "engine": attempt.name,
+        "library": attempt.is_library,
+        "dt_s": attempt.dt,
+        "error": attempt.error,
+        "us_per_simulated_s": attempt.cost * 1e6,
+    }
+
+
+def floor_of(noise: float, busy: float) -> float:
+    """The fraction by which two costs must differ to be compared; inf where none can be."""
+    return max(noise, LOUD) if noise <= LOUD and not busy > BUSY else inf
+
+
+def ranked_rows(keeping: Iterable[Attempt], bound: float, floor: float) -> list[Answer]:
+    """The libraries first, the cheapest first: those that cost at most `floor` more than the first
+    of a rank have the same rank."""
+    rows = []
+    for library in (True, False):
+        rank, least = 0, -inf
+        group = sorted((x for x in keeping if x.is_library is library), key=lambda x: x.cost)
+        for k, attempt in enumerate(group, 1):
+            if not attempt.cost <= least * (1 + floor):
+                rank, least = k, attempt.cost
+            row = as_row(attempt) | {"rank": rank, "error_of_nine_tenths": attempt.usually}
+            rows.append(row | {"kept_in": attempt.kept_in(bound), "starts": len(attempt.starts)})
+    return rows
+
+
+def change_row(plain: Attempt, changed: Attempt, bound: float, floor: float) -> Answer:
+    """An engine with a change of an option against it without, at the same step size; the verdict
+    is on the error, or else on the cost, if it changes by more than the fraction `floor`."""
+    every = len(plain.starts) // len(changed.starts)
+    before, after = float(np.median(plain.starts[::every])), float(np.median(changed.starts))
+    ratio = changed.cost / plain.cost
+    if not changed.holds(bound):
+        verdict = TOO_FAR_OFF
+    elif ratio < 1 - floor:
+        verdict = SAVES_TIME
+    elif after <= HALF * before:
+        verdict = NEARER
+    else:
+        verdict = NO_GAIN if isfinite(floor) else NOT_COMPARED
+    row = as_row(changed) | {"change": changed.change, "error_without": plain.error}
+    return row | {"cost_ratio": ratio, "verdict": verdict, "medians": [before, after]}
 
 
 def those_that_keep(ladder: Sequence[Attempt], bound: float) -> list[Attempt]:

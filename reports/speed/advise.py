@@ -8,7 +8,6 @@ import os
 import sys
 from collections.abc import Mapping, Sequence
 from math import inf, isfinite, nan
-from operator import attrgetter
 from typing import Any, NoReturn
 
 import numpy as np
@@ -23,38 +22,31 @@ from crosscheck2d.reports.speed.advice import (
     LASTING,
     LOUD,
     STATISTICS,
-    Advice,
-    Attempt,
+    Answer,
     Inquiry,
     NoAdvice,
     Requirement,
+    floor_of,
 )
 from crosscheck2d.reports.speed.ladder import PURPOSES, STARTS
 from crosscheck2d.reports.terminal.console import Console, print_table, print_texts
 from crosscheck2d.reports.terminal.exits import DONE, FAILED, refuse, say
 from crosscheck2d.reports.terminal.progress import Progress
 
-Row = dict[str, Any]
 SHOWN = 3  # ranks: the cheapest and the next two
-# fields of the answer, and of its rows -> attributes
-ANSWER = {"scenario": "scene", "purpose": "purpose", "error_at_most": "bound", "until_s": "until"}
-ANSWER |= {"duration_s": "duration", "collisions_judged": "collisions", "dt_s_tried": "step_sizes"}
-ATTEMPT = {"engine": "name", "library": "is_library", "dt_s": "dt", "error": "error"}
-CHANGE = {"change": "changed.change", "error_without": "plain.error"}
-NINE, AT = "9 of 10\nuntil, s", "at dt,\nms"
-SHORT = {  # and headings
-    "error_at_finest": ("finest", ""),
-    "kept_until_s": ("usual.until", "until,\ns"),
-    "kept_from_nine_tenths_until_s": ("usual.lasting", NINE),
-    "at_dt_s": ("usual.dt", AT),
-    "longest_until_s": ("longest.until", "longest\nuntil,\ns"),
-    "longest_from_nine_tenths_until_s": ("longest.lasting", NINE),
-    "longest_at_dt_s": ("longest.dt", AT),
-    "why": ("reason", ""),
-}
 # tables: a field of their rows -> its heading; step sizes are shown in ms
 CHOICES = {"rank": "", "engine": "engine", "dt_s": "dt, ms", "error": "error"}
 CHOICES |= {"error_of_nine_tenths": "9 of 10\nwithin", "us_per_simulated_s": "µs per\nsimulated s"}
+NINE, AT = "9 of 10\nuntil, s", "at dt,\nms"
+UNTIL = {
+    "engine": "engine",
+    "kept_until_s": "until,\ns",
+    "kept_from_nine_tenths_until_s": NINE,
+    "at_dt_s": AT,
+    "longest_until_s": "longest\nuntil,\ns",
+    "longest_from_nine_tenths_until_s": NINE,
+    "longest_at_dt_s": AT,
+}
 
 
 def give_advice(
@@ -64,23 +56,25 @@ def give_advice(
     2 on bad input."""
     if purpose not in PURPOSES:
         refuse([unknown("purpose", purpose, PURPOSES) + f"; allowed: {', '.join(PURPOSES)}"])
-    bound = bound_of(error)
-    (checked,) = checked_scenes([scene], [], False, seed)
+    requirement = Requirement(scene, seed, purpose, bound_of(error))
+    checked_scenes([scene], [], False, seed)
+    at_start = open_scene(scene, seed).scene
     rows = {name: row_of(name) for name in checked_engines(engines, ENGINES)}
-    names = told_apart(rows, open_scene(checked, seed).scene)
     with Progress() as progress:
         try:
-            requirement = Requirement(checked, seed, purpose, bound)
-            advice = Inquiry(requirement, os.cpu_count() or 1, progress).advise(names)
+            inquiry = Inquiry(requirement, os.cpu_count() or 1, progress)
+            answer = inquiry.advise(told_apart(rows, at_start))
         except NoAdvice as reason:
             say(f"{scene}: {reason}")
             sys.exit(FAILED)
-    snippet = snippet_of(advice, checked, seed)
+    kept = [*answer["cheapest_first"], *(answer["statistics"] or {}).get("cheapest_first", ())]
+    best = next((row for row in kept if row["library"]), None)
+    snippet = write_snippet(best["engine"], at_start, best["dt_s"]) if best else ""
     if as_json:
-        print(json.dumps(finite(answer_of(advice)) | {"snippet": snippet}, indent=1))
+        print(json.dumps(finite(answer) | {"snippet": snippet}, indent=1))
     else:
-        print_advice(advice, snippet)
-    sys.exit(DONE if advice.keeping else FAILED)
+        print_advice(answer, snippet)
+    sys.exit(DONE if answer["cheapest_first"] else FAILED)
 
 
 def bound_of(error: str) -> float:
@@ -94,49 +88,6 @@ def bound_of(error: str) -> float:
     return bound
 
 
-def snippet_of(advice: Advice, scene: str, seed: int) -> str:
-    ranked = [*advice.ranked, *(advice.statistics.ranked if advice.statistics else ())]
-    for _, attempt in ranked:
-        if attempt.is_library:
-            return write_snippet(attempt.name, open_scene(scene, seed).scene, attempt.dt)
-    return ""
-
-
-def answer_of(advice: Advice) -> Row:
-    """The advice as `--json` gives it, where a number that is not finite is null."""
-
-    def row(attempt: Attempt) -> Row:
-        return fields(attempt, ATTEMPT) | {"us_per_simulated_s": attempt.cost * 1e6}
-
-    ranked = [
-        row(attempt)
-        | {"rank": rank, "error_of_nine_tenths": attempt.usually}
-        | {"kept_in": attempt.kept_in(advice.bound), "starts": len(attempt.starts)}
-        for rank, attempt in advice.ranked
-    ]
-    changes = [
-        row(change.changed)
-        | fields(change, CHANGE)
-        | {"cost_ratio": change.changed.cost / change.plain.cost}
-        | {"verdict": change.verdict(advice.bound, advice.floor)}
-        for change in advice.changes
-    ]
-    ends = {field: attribute for field, (attribute, _) in SHORT.items()}
-    return fields(advice, ANSWER) | {
-        "cheapest_first": ranked,
-        "not_within": [row(x.best) | fields(x, ends) for x in advice.short],
-        "not_to_the_end": [row(x) | {"why": x.reason} for x in advice.partial],
-        "changes": changes,
-        "noise": advice.noise,
-        "cores_busy": advice.busy,
-        "statistics": answer_of(advice.statistics) if advice.statistics else None,
-    }
-
-
-def fields(of: Any, attributes: Mapping[str, str]) -> Row:
-    return {field: attrgetter(path)(of) for field, path in attributes.items()}
-
-
 def finite(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: finite(part) for key, part in value.items()}
@@ -145,38 +96,52 @@ def finite(value: Any) -> Any:
     return value if not isinstance(value, float) or isfinite(value) else None
 
 
-def print_advice(advice: Advice, snippet: str = "") -> None:
-    console, answer = Console(), answer_of(advice)
-    question = f"{PURPOSES[advice.purpose].what}, at most {number(advice.bound)}"
-    console.print(f"{advice.scene}: {question}, {advice.judged}\n", highlight=False)
-    if advice.keeping and not advice.quiet:  # before the costs that it concerns
-        console.print(f"{sentence_on_times(advice)}\n", highlight=False)
-    print_group(console, advice, answer, True)
-    if statistics := advice.statistics:
+def print_advice(answer: Answer, snippet: str = "") -> None:
+    console = Console()
+    question = f"{PURPOSES[answer['purpose']].what}, at most {number(answer['error_at_most'])}"
+    console.print(f"{answer['scenario']}: {question}, {judged(answer)}\n", highlight=False)
+    quiet = isfinite(floor_of(answer["noise"], answer["cores_busy"]))
+    on_times = f"{sentence_on_times(answer)}\n" if answer["cheapest_first"] else ""
+    if on_times and not quiet:  # before the costs that it concerns
+        console.print(on_times, highlight=False)
+    print_group(console, answer, True)
+    if statistics := answer["statistics"]:
         console.print(
             f"Averages over time need less: `--for {STATISTICS}` (energies, distance from the"
-            f" start; at most {number(statistics.bound)})",
+            f" start; at most {number(statistics['error_at_most'])})",
             style="bold",
         )
-        if statistics.keeping and not statistics.quiet:
+        if statistics["cheapest_first"] and not isfinite(
+            floor_of(statistics["noise"], statistics["cores_busy"])
+        ):
             console.print(sentence_on_times(statistics), highlight=False)
-        print_group(console, statistics, answer["statistics"], True)
-    print_group(console, advice, answer, False)
+        print_group(console, statistics, True)
+    print_group(console, answer, False)
     partial = "Not advised: what goes wrong in the whole scene"
     for title, rows in ((partial, answer["not_to_the_end"]), ("Why", answer["not_within"])):
         if rows:
             print_texts(console, {row["engine"]: row["why"] for row in rows}, title)
             console.print()
-    if advice.changes:
-        print_changes(console, advice)
-    if advice.keeping and advice.quiet:
-        console.print(f"{sentence_on_times(advice)}\n", highlight=False)
+    if answer["changes"]:
+        print_changes(console, answer)
+    if on_times and quiet:
+        console.print(on_times, highlight=False)
     if snippet:
         console.print("The settings that were run:", style="bold")
         console.print(snippet, highlight=False, soft_wrap=True)
 
 
-def print_group(console: Console, advice: Advice, answer: Row, library: bool) -> None:
+def judged(answer: Answer) -> str:
+    part = f"up to {number(answer['until_s'])} of {number(answer['duration_s'])} s"
+    early = is_cut(answer) and not answer["collisions_judged"]
+    return f"{part}, before any collision" if early else part
+
+
+def is_cut(answer: Answer) -> bool:
+    return bool(answer["until_s"] < answer["duration_s"])
+
+
+def print_group(console: Console, answer: Answer, library: bool) -> None:
     """Print the libraries, or the solvers of this project: those that keep the error, and until
     when the others do."""
     ranked, short, partial = (
@@ -185,54 +150,53 @@ def print_group(console: Console, advice: Advice, answer: Row, library: bool) ->
     )
     group = "Libraries" if library else "Solvers of this project"
     if ranked:
-        print_choices(console, advice, ranked, group)
+        print_choices(console, answer, ranked, group)
     elif short or partial:
         engine = "library" if library else "solver of this project"
         right = " that is right in the whole scene" if partial else ""
         console.print(f"No {engine}{right} keeps this error at any step size tried.", style="bold")
     if short:
-        print_short(console, advice, short, group)
+        print_short(console, answer, short, group)
     if ranked or short or partial:
         console.print()
 
 
 def print_rows(
-    console: Console, rows: Sequence[Row], headings: Mapping[str, str], title: str
+    console: Console, rows: Sequence[Answer], headings: Mapping[str, str], title: str, note: str
 ) -> None:
     def cell(field: str, value: Any) -> str:
         return value if field == "engine" else number(value * (1e3 if "dt_s" in field else 1))
 
     cells = [[cell(field, row[field]) for field in headings] for row in rows]
     print_table(console, [*headings.values()], cells, title)
+    console.print(note, highlight=False)
 
 
-def print_choices(console: Console, advice: Advice, ranked: Sequence[Row], group: str) -> None:
+def print_choices(console: Console, answer: Answer, ranked: Sequence[Answer], group: str) -> None:
     part = ", in the whole scene"
-    if advice.until < advice.duration:
-        part = f": error {advice.judged}; cost of the whole scene"
-    shown = [row for row in ranked if row["rank"] <= SHOWN]
-    rows = shown if advice.quiet else [row | {"rank": nan} for row in shown]
-    print_rows(console, rows, CHOICES, f"{group}, cheapest first{part}")
-    console.print(
-        f"9 of 10 within: the error of nine tenths of runs from {STARTS} instants of a step.",
-        highlight=False,
-    )
-    if dearer := ranked[len(shown) :]:
+    if is_cut(answer):
+        part = f": error {judged(answer)}; cost of the whole scene"
+    rows = [row for row in ranked if row["rank"] <= SHOWN]
+    dearer = ranked[len(rows) :]
+    if not isfinite(floor_of(answer["noise"], answer["cores_busy"])):
+        rows = [row | {"rank": nan} for row in rows]
+    note = f"9 of 10 within: the error of nine tenths of runs from {STARTS} instants of a step."
+    print_rows(console, rows, CHOICES, f"{group}, cheapest first{part}", note)
+    if dearer:
         costs = (f"{row['engine']} ({number(row['us_per_simulated_s'])} µs)" for row in dearer)
         console.print(f"Also within it: {', '.join(costs)}.", highlight=False)
 
 
-def print_short(console: Console, advice: Advice, short: Sequence[Row], group: str) -> None:
+def print_short(console: Console, answer: Answer, short: Sequence[Answer], group: str) -> None:
     # how near they come; and of an error that only grows until when they keep it
-    coarse, fine = (number(advice.step_sizes[k] * 1e3) for k in (0, -1))
+    coarse, *_, fine = (number(dt * 1e3) for dt in answer["dt_s_tried"])
     until = {row["engine"]: float(np.nan_to_num(row["longest_until_s"], nan=-inf)) for row in short}
     rows = sorted(short, key=lambda row: (-until[row["engine"]], row["engine"]))
     finest = {"error_at_finest": f"error at\n{fine} ms"}
     title = f"{group} that do not keep it"
-    if advice.purpose in LASTING:
-        title += f" to {number(advice.until)} s, and until when"
-        kept = {field: heading for field, (_, heading) in SHORT.items() if heading}
-        headings = {"engine": "engine"} | kept | finest
+    if answer["purpose"] in LASTING:
+        title += f" to {number(answer['until_s'])} s, and until when"
+        headings = UNTIL | finest
         note = (
             f"At the usual step size, and at that of {coarse} to {fine} ms which keeps it longest;"
             f" 9 of 10: nine tenths of runs from {STARTS} instants of a step keep it until then."
@@ -244,34 +208,39 @@ def print_short(console: Console, advice: Advice, short: Sequence[Row], group: s
             f"Tried: {coarse} to {fine} ms. A step size counts only if it and every finer one keep"
             " the error, and it does from nine tenths of the instants of a step."
         )
-    print_rows(console, rows, headings, title)
-    console.print(note, highlight=False)
+    print_rows(console, rows, headings, title, note)
 
 
-def print_changes(console: Console, advice: Advice) -> None:
-    what = "this part of the scene" if advice.until < advice.duration else "the scene"
+def print_changes(console: Console, answer: Answer) -> None:
+    what = "this part of the scene" if is_cut(answer) else "the scene"
     title = f"What {what} does not need: one option changed, at the same step size"
     rows = [
         [
-            f"{change.plain.name}, {change.changed.change}",
-            " → ".join(number(error, 2) for error in change.errors),
-            f"× {number(change.changed.cost / change.plain.cost, 2)}",
-            change.verdict(advice.bound, advice.floor),
+            f"{change['engine']}, {change['change']}",
+            " → ".join(number(error, 2) for error in change["medians"]),
+            f"× {number(change['cost_ratio'], 2)}",
+            change["verdict"],
         ]
-        for change in advice.changes
+        for change in answer["changes"]
     ]
     print_table(console, ["engine, with", "error", "cost", "verdict"], rows, title, ["verdict"])
     console.print()
 
 
-def sentence_on_times(advice: Advice) -> str:
-    said = f"Two timings of the same engine differ by {advice.noise:.0%}"
-    if advice.quiet:
-        return f"{said}. Costs that differ by less than {advice.floor:.0%} are the same."
-    causes = [said] if advice.noise > LOUD else []
-    if advice.busy > BUSY:
-        causes.append(f"Other programs keep {advice.busy:.1f} of {os.cpu_count()} cores busy")
+def sentence_on_times(answer: Answer) -> str:
+    noise, busy = answer["noise"], answer["cores_busy"]
+    differ = f"two timings of the same engine differ by {noise:.0%}"
+    floor = floor_of(noise, busy)
+    if isfinite(floor):
+        return f"{upper(differ)}. Costs that differ by less than {floor:.0%} are the same."
+    causes = [differ] if noise > LOUD else []
+    if busy > BUSY:
+        causes.append(f"other programs keep {busy:.1f} of {os.cpu_count()} cores busy")
     return (
-        f"{', and '.join([causes[0], *(each[0].lower() + each[1:] for each in causes[1:])])}, so"
-        " times cannot be compared: measure again when the machine is idle."
+        f"{upper(', and '.join(causes))}, so times cannot be compared: measure again when the"
+        " machine is idle."
     )
+
+
+def upper(text: str) -> str:
+    return text[:1].upper() + text[1:]

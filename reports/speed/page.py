@@ -3,8 +3,9 @@ charts of error against cost and of cost against the number of disks. Its words 
 
 from __future__ import annotations
 
+import re
 import tomllib
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from pathlib import Path
 from string import Formatter
 from typing import Any
@@ -71,18 +72,28 @@ def section(key: str, parts: Sequence[kit.Part], **values: Any) -> kit.Section:
     return kit.Section(text(key, "title"), text(key, "says", **values), parts, folded, key)
 
 
-def table(key: str, frame: pd.DataFrame, cells: Mapping[str, Any] | None = None) -> kit.Table:
-    """A table with a row for each of a frame; `cells` are columns beside those of the frame."""
-    frame = frame.assign(**cells or {})
+def table(key: str, frame: pd.DataFrame, **cells: Any) -> kit.Table:
+    """A table with a row for each of a frame; `cells` are columns beside those of the frame. A text
+    of which no number is known is NaN."""
+    words, frame = TEXT[key], frame.assign(**cells)
     if "profile" in frame:
         frame["name"] = names_of(frame)
+    if "status" in frame:  # and in how many of the seeds
+        counts = zip(frame.failed, frame.seeds) if "seeds" in frame else ()
+        seeds = [f"{failed} of {seeds}: " for failed, seeds in counts] or [""] * len(frame)
+        failures = zip(seeds, frame.status, frame.reason)
+        frame["failure"] = [f"{k}{s}: {why}" if s != "ok" else "" for k, s, why in failures]
     rows: list[Any] = frame.to_dict("records")
-    columns = {
-        heading: [FORMAT.vformat(of, (), row) if "{" in of else row[of] for row in rows]
-        for heading, of in TEXT[key]["columns"].items()
-    }
-    index = [row[TEXT[key].get("label", "name")] for row in rows]
-    known = {name: TEXT[key][name] for name in ("sortable", "css", "corner") if name in TEXT[key]}
+
+    def cell(row: dict[str, Any], of: str) -> Any:
+        names = re.findall(r"{(\w+)", of)
+        if names and all(pd.isna(row[name]) for name in names):
+            return np.nan
+        return FORMAT.vformat(of, (), row) if names else row[of]
+
+    columns = {head: [cell(row, of) for row in rows] for head, of in words["columns"].items()}
+    index = [row[words.get("label", "name")] for row in rows]
+    known = {name: words[name] for name in ("sortable", "css", "corner") if name in words}
     data = pd.DataFrame(columns, index=index, dtype=object)
     return kit.Table(data, caption=text(key, "caption", count=len(frame)), **known)
 
@@ -96,16 +107,23 @@ def write_page(path: Path, results: Results, about: Mapping[str, Any]) -> None:
     lead.append(text("page", "advise"))
     if about["load"] > BUSY:
         lead.append(text("page", "busy", load=about["load"], cores=about["machine"]["cores"]))
-    versus, models = results.versus, results.models.replace("", "none")
+    options = plan.effort.option_scenes
     sections = [
-        *situation_section(results),
+        situation_section(results),
         pooled_section(results),
-        section("versus", [table("versus", versus)]),
-        section("models", [table("models", models)]),
-        *budget_sections(results),
-        *option_sections(results),
-        *sweep_sections(results),
-        *size_sections(results),
+        section("versus", [table("versus", results.versus)]),
+        section("models", [table("models", results.models.replace("", "none"))]),
+        budget_section(results),
+        None
+        if results.options.empty
+        else section(
+            "options",
+            [table("options", results.options)],
+            count=len(options),
+            scenes=", ".join(options),
+        ),
+        sweep_section(results),
+        size_section(results),
         section("driving", [table("driving", results.driving)]),
         scenes_section(results),
     ]
@@ -113,7 +131,7 @@ def write_page(path: Path, results: Results, about: Mapping[str, Any]) -> None:
         sections.append(kit.Section(f"Left out: {len(items)}", "", [kit.Text(items=items)], True))
     page = kit.Page(
         "Speed against accuracy",
-        [*sections, kit.run_section(about)],
+        [*filter(None, sections), kit.run_section(about)],
         GENERATOR,
         lead,
         names=[*plan.engines, *(sweep.name for sweep in plan.sweeps)],
@@ -123,25 +141,7 @@ def write_page(path: Path, results: Results, about: Mapping[str, Any]) -> None:
     put_text(path, kit.render_page(page))
 
 
-def failures(frame: pd.DataFrame) -> list[str]:
-    rows = zip(frame.status, frame.reason)
-    return [f"{status}: {reason}" if status != "ok" else "" for status, reason in rows]
-
-
-def intervals(
-    known: Iterable[Any], low: pd.Series, high: pd.Series, digits: int = 3, otherwise: str = ""
-) -> list[str]:
-    return [
-        f"{number(a, digits)} to {number(b, digits)}" if k else otherwise
-        for k, a, b in zip(known, low, high)
-    ]
-
-
-def seed_intervals(frame: pd.DataFrame) -> list[str]:
-    return intervals(frame.seeds > 1, frame.error_low, frame.error_high, otherwise=NOT_REACHED)
-
-
-def situation_section(results: Results) -> list[kit.Section]:
+def situation_section(results: Results) -> kit.Section | None:
     points, plan = results.points, results.plan
     of_scene = {}
     for scene in plan.effort.scenes:
@@ -152,37 +152,30 @@ def situation_section(results: Results) -> list[kit.Section]:
     here = points[points.step_size == middle].assign(name=names_of)
     here = here.assign(situation=here.scenario.map(of_scene)).explode("situation")
     medians = here.groupby(["situation", "name"], sort=False)[["error", "cost"]].median()
-    names, rows = list(dict.fromkeys(here.name)), []
-    titles = [title for title in SITUATIONS if title in set(here.situation)]
-    for title in titles:
-        errors = medians.error.loc[title].reindex(names)
-        best = errors[np.isfinite(errors)].min()
-        cells = zip(errors, medians.cost.loc[title].reindex(names))
-        rows.append(
-            [
-                kit.TableCell(
-                    error, css="best" if error == best else "", side=f"{number(cost)} µs/s"
-                )
-                for error, cost in cells
-            ]
-        )
-    notes = [kit.TableCell(t, notes=(kit.TableCell(SITUATIONS[t]),)) for t in titles]
-    frame = pd.DataFrame(rows, notes, names, dtype=object)
-    return [section("which", [kit.Table(frame)])] if titles else []
+    names, rows = list(dict.fromkeys(here.name)), {}
+    for title in (title for title in SITUATIONS if title in set(here.situation)):
+        cells = medians.loc[title].reindex(names)
+        best = cells.error[np.isfinite(cells.error)].min()
+        rows[kit.TableCell(title, notes=(kit.TableCell(SITUATIONS[title]),))] = [
+            kit.TableCell(error, css="best" if error == best else "", side=f"{number(cost)} µs/s")
+            for error, cost in zip(cells.error, cells.cost)
+        ]
+    frame = pd.DataFrame([*rows.values()], [*rows], names, dtype=object)
+    return section("which", [kit.Table(frame)]) if rows else None
 
 
 def drawn_lines(points: pd.DataFrame) -> list[Line]:
     """A line for each engine over its step sizes; faint, the time without idle steps and calls;
     and as the exact answer is drawn, the Pareto front."""
     has = points[points.cost.notna() & np.isfinite(points.error)]
-    height = np.maximum(has.error.to_numpy(float), LOWEST)
-    best = front(has.cost.to_numpy(float), height)
-    lines = [Line(style.TRUTH, has.cost.to_numpy(float)[best], height[best], faint=True)]
-    for (engine, profile), group in has.groupby(WHO, sort=False):
-        name, error = f"{engine}:{profile}", np.maximum(group.error.to_numpy(float), LOWEST)
-        bare = group.bare if "bare" in group else without_idle(group.cost, group.idle)
-        lines.append(Line(name, bare, error, faint=True))
-        lines.append(Line(name, group.cost, error, name))
+    has = has.assign(name=names_of, error=has.error.clip(lower=LOWEST))
+    if "bare" not in has:
+        has["bare"] = without_idle(has.cost, has.idle)
+    best = has.iloc[front(has.cost.to_numpy(float), has.error.to_numpy(float))]
+    lines = [Line(style.TRUTH, best.cost.to_numpy(), best.error.to_numpy(), faint=True)]
+    for name, group in has.groupby("name", sort=False):
+        lines.append(Line(str(name), group.bare, group.error, faint=True))
+        lines.append(Line(str(name), group.cost, group.error, str(name)))
     return lines
 
 
@@ -224,15 +217,19 @@ def pooled_section(results: Results) -> kit.Section:
     return section("pooled", [chart, reached_table(results)], noise=results.noise_sentence)
 
 
+def in_first_order(table: pd.DataFrame, columns: str) -> pd.DataFrame:
+    # cell by name and `columns`, the names in the order of appearance
+    wide = table.pivot(index="name", columns=columns, values="cell")
+    return wide.loc[[*dict.fromkeys(table.name)]]
+
+
 def reached_table(results: Results) -> kit.Table:
     reached = results.pooled_reached
     rows = reached.to_dict("records")
     cells: list[Any] = [kit.TableCell(cost_of(row), row["why"]) for row in rows]
-    reached = reached.assign(name=names_of, cell=cells)
-    frame = reached.pivot(index="name", columns="accuracy", values="cell")
-    frame = frame.loc[[*dict.fromkeys(reached.name)], [*ACCURACIES]]
-    caption = text("reached", "caption", cheaper=said_of_cheaper(results.pooled_reached))
-    return kit.Table(frame, corner="Engine", caption=caption)
+    frame = in_first_order(reached.assign(name=names_of, cell=cells), "accuracy")
+    caption = text("reached", "caption", cheaper=said_of_cheaper(reached))
+    return kit.Table(frame[[*ACCURACIES]], corner="Engine", caption=caption)
 
 
 def cost_of(row: Mapping[Hashable, Any]) -> str:
@@ -244,10 +241,10 @@ def cost_of(row: Mapping[Hashable, Any]) -> str:
     return f"{row['got']} of {row['of']}" if row["of"] > 1 else NOT_REACHED
 
 
-def budget_sections(results: Results) -> list[kit.Section]:
+def budget_section(results: Results) -> kit.Section | None:
     frame, explained = results.measured.budget, results.explained
     if frame.empty:
-        return []
+        return None
     texts = [text("budget", "reference"), text("budget", "sum")]
     absent = [name for name in results.plan.engines if name not in set(names_of(explained))]
     if absent:
@@ -261,12 +258,12 @@ def budget_sections(results: Results) -> list[kit.Section]:
     ]
     if len(cuts := budget.cut_scenes(explained)):
         share = (100 * cuts.until_s / cuts.horizon_s).map("{:.0f}".format)
-        parts.append(table("cut", cuts, {"share": share}))
+        parts.append(table("cut", cuts, share=share))
     parts.append(contributions(frame))
     changed = frame[frame[["off_engine_radii", "off_reference_radii"]].max(axis=1) > budget.LEAST]
     if len(changed):
         parts.append(table("disabled", changed))
-    return [section("budget", parts, share=budget.explained_share(explained))]
+    return section("budget", parts, share=budget.explained_share(explained))
 
 
 def causes(parts: pd.DataFrame) -> list[str]:
@@ -277,7 +274,6 @@ def causes(parts: pd.DataFrame) -> list[str]:
 def overview(parts: pd.DataFrame) -> kit.Table:
     """In how many scenes an engine was played, has an error, has it explained, and in how many
     each contribution is the largest; every engine has its row, also one that failed them all."""
-    columns = ["played", "errors", "explained", *causes(parts)]
     rows = {}
     for (engine, profile), group in parts.groupby(WHO, sort=False):
         played = group[group.note == ""]
@@ -285,10 +281,11 @@ def overview(parts: pd.DataFrame) -> kit.Table:
         scenes = scenes.reindex(columns=[budget.TOTAL, budget.RESIDUAL, *causes(parts)]).fillna(0.0)
         off, known = scenes[scenes[budget.TOTAL] > budget.LEAST], scenes[causes(parts)]
         largest = known[known.max(axis=1) > budget.LEAST].idxmax(axis=1)
-        within = int((off[budget.RESIDUAL] <= budget.TO[0] * off[budget.TOTAL]).sum())
-        counts = [int((largest == cause).sum()) for cause in known.columns]
-        rows[f"{engine}:{profile}"] = [len(scenes), len(off), within, *counts]
-    frame = pd.DataFrame(rows, columns, dtype=object).T
+        within = off[budget.RESIDUAL] <= budget.TO[0] * off[budget.TOTAL]
+        counts = {"played": len(scenes), "errors": len(off), "explained": int(within.sum())}
+        counts |= {cause: int((largest == cause).sum()) for cause in known.columns}
+        rows[f"{engine}:{profile}"] = counts
+    frame = pd.DataFrame.from_dict(rows, "index", dtype=object)
     return kit.Table(frame, corner="Engine", caption=text("budget", "overview"))
 
 
@@ -299,100 +296,75 @@ def contributions(parts: pd.DataFrame) -> kit.Table:
     for scene, here in parts.groupby("scenario", sort=False):
         here = here.assign(name=names_of)
         wide = here.pivot(index="name", columns="contribution", values="position_radii")
-        of_anybody = [c for c in causes(parts) if c in wide and wide[c].max() > budget.LEAST]
-        columns = [
-            budget.TOTAL,
-            budget.RESIDUAL,
-            *of_anybody,
-            budget.INTERPLAY,
-            budget.SUM,
-            budget.ALL,
-        ]
+        known = [c for c in causes(parts) if c in wide and wide[c].max() > budget.LEAST]
+        totals = [budget.INTERPLAY, budget.SUM, budget.ALL]
+        columns = [budget.TOTAL, budget.RESIDUAL, *known, *totals]
         wide = wide.reindex(columns=columns, index=[*dict.fromkeys(here.name)])
         notes = here[here.note != ""]
         items = [text("budget", "failed", name=n, note=x) for n, x in zip(notes.name, notes.note)]
         label = f"budget of {scene}"  # a row's label is its address
-        opens[label] = [
-            kit.Table(wide.astype(object), caption=text("budget", "all")),
-            kit.Text(items=items),
-        ]
+        caption = text("budget", "all")
+        opens[label] = [kit.Table(wide.astype(object), caption=caption), kit.Text(items=items)]
         extents[label] = here[["until_s", "horizon_s", "duration_s"]].iloc[0].tolist()
     headings = ["evaluated to, s", "exact answer to, s", "duration, s"]
     frame = pd.DataFrame.from_dict(extents, "index", columns=headings).astype(object)
     return kit.Table(frame, corner="All contributions in", opens=opens)
 
 
-def option_sections(results: Results) -> list[kit.Section]:
-    scenes = results.plan.effort.option_scenes
-    if results.options.empty:
-        return []
-    parts = [options_table(results.options)]
-    return [section("options", parts, count=len(scenes), scenes=", ".join(scenes))]
-
-
-def options_table(options: pd.DataFrame) -> kit.Table:
-    return table("options", options, {"failure": failures(options)})
-
-
-def sweep_sections(results: Results) -> list[kit.Section]:
-    if results.sweeps.empty:
-        return []
-    pooled, absent = pooled_sweeps(results.sweeps)
+def sweep_section(results: Results) -> kit.Section | None:
+    sweeps = results.sweeps
+    if sweeps.empty:
+        return None
+    pooled, absent = pooled_sweeps(sweeps)
     lines = []
     for (engine, profile), group in pooled.groupby(WHO, sort=False):
         name = str(profile).partition("+")[2] or str(profile)
         lines.append(Line(f"{engine}:{profile}", group.cost, group.error, name))
-    scenes = counted(results.sweeps.scenario.nunique(), "scene")
-    caption = text("sweeps", "pooled", scenes=scenes)
+    caption = text("sweeps", "pooled", scenes=counted(sweeps.scenario.nunique(), "scene"))
     if absent:
         names = ", ".join(f"{engine} in {scene}" for engine, scene in absent)
         caption += f" {text('sweeps', 'without', names=names)}"
     x, y = "time / time as matched", "error / error as matched"
     chart = kit.Chart(drawn(lines, "error against cost of sweeps", x, y, ""), "Pooled", caption)
-    return [section("sweeps", [chart, sweeps_table(results.sweeps)])]
+    named = sweeps.assign(change=sweeps.change.replace("", NOT_REACHED))
+    return section("sweeps", [chart, seeds_table("sweeps", named)])
 
 
-def sweeps_table(sweeps: pd.DataFrame) -> kit.Table:
-    change = sweeps.change.replace("", NOT_REACHED)
-    cells = {"change": change, "failure": failures(sweeps), "interval": seed_intervals(sweeps)}
-    return table("sweeps", sweeps, cells)
+def seeds_table(key: str, frame: pd.DataFrame) -> kit.Table:
+    several = frame.seeds > 1
+    low, high = frame.error_low.where(several), frame.error_high.where(several)
+    return table(key, frame, error_low=low, error_high=high)
 
 
-def size_sections(results: Results) -> list[kit.Section]:
+def size_section(results: Results) -> kit.Section | None:
     costs = results.sizes.assign(name=names_of)
     if costs.empty:
-        return []
+        return None
     lines = [
         Line(str(name), group.n, group.cost, str(name))
         for name, group in costs.groupby("name", sort=False)
     ]
     title = "Cost of a step against the number of disks"
     svg = drawn(lines, title, "disks", "engine time of a step, µs", "")
+    quartiles = "{low} to {high}, fastest {best}"
+    rows: list[Any] = costs.to_dict("records")
     cells: list[Any] = [
-        kit.TableCell(row.cost, quartiles(row), side=f"worst {number(row.worst)}")
-        for row in costs.itertuples()
+        kit.TableCell(
+            row["cost"],
+            FORMAT.vformat(quartiles, (), row),
+            side=f"worst {number(row['worst'])}",
+        )
+        for row in rows
     ]
-    costs["cell"] = cells
-    steps = costs.pivot(index="name", columns="n", values="cell").fillna("")
-    steps = steps.loc[[*dict.fromkeys(costs.name)]].rename(columns="{} disks".format)
+    steps = in_first_order(costs.assign(cell=cells), "n").fillna("")
     parts: list[kit.Part] = [
         kit.Chart(svg, title, text("sizes", "caption")),
-        kit.Table(steps, corner="µs a step"),
-        growth_table(results.growth),
+        kit.Table(steps.rename(columns="{} disks".format), corner="µs a step"),
+        table("growth", results.growth),
     ]
     if len(results.pile):
         parts.append(table("pile", results.pile))
-    return [section("sizes", parts, sentence=end_of_all_pairs(costs))]
-
-
-def growth_table(growth: pd.DataFrame) -> kit.Table:
-    known = np.isfinite(growth.exponent)
-    cells = intervals(known, growth.low, growth.high, otherwise="too few sizes")
-    return table("growth", growth, {"interval": cells})
-
-
-def quartiles(row: Any) -> str:
-    return f"{number(row.low)} to {number(row.high)}, fastest {number(row.best)}"
+    return section("sizes", parts, sentence=end_of_all_pairs(costs))
 
 
 def scenes_section(results: Results) -> kit.Section:
@@ -426,28 +398,22 @@ def scene_parts(results: Results, scene: str, points: pd.DataFrame) -> list[kit.
         frame[frame.scenario == scene].drop(columns="scenario")
         for frame in (results.orders, results.bindings, results.reached)
     )
-    orders = orders.merge(bindings, on=WHO, how="left")
-    cells: dict[str, list[Any]] = {
-        "interval": intervals(np.isfinite(orders.slope), orders.low, orders.high, 2),
-        "verdict": [
-            kit.TableCell(VERDICTS.get(v, v), css="bad" if v in (ELSEWHERE, UNSTEADY) else "")
-            for v in orders.verdict
-        ],
-        "failure": [f"{k} of {n}" if k else "" for k, n in zip(orders.failed, orders.steps)],
-    }
-    for accuracy in ACCURACIES:
-        here = reached[reached.accuracy == accuracy]
-        both = orders[WHO].merge(here, on=WHO, how="left")
-        cells[accuracy] = [
-            kit.TableCell(row["why"], css="soft")
-            if np.isnan(row["cost"])
-            else kit.TableCell(row["cost"], f"at dt {number(row['dt_s'])} s")
-            for row in both.to_dict("records")
-        ]
-    return [kit.Chart(svg, "", caption), table("orders", orders, cells), points_table(points)]
-
-
-def points_table(points: pd.DataFrame) -> kit.Table:
-    rows = zip(failures(points), points.failed, points.seeds)
-    failure = [f"{k} of {n}: {reason}" if k else "" for reason, k, n in rows]
-    return table("points", points, {"failure": failure, "interval": seed_intervals(points)})
+    cells: list[Any] = [
+        kit.TableCell(row["why"], css="soft")
+        if np.isnan(row["cost"])
+        else kit.TableCell(row["cost"], f"at dt {number(row['dt_s'])} s")
+        for row in reached.to_dict("records")
+    ]
+    costs = (
+        reached.assign(cell=cells).pivot(index=WHO, columns="accuracy", values="cell").reset_index()
+    )
+    frame = orders.merge(bindings, on=WHO, how="left").merge(costs, on=WHO, how="left")
+    verdicts: list[Any] = [
+        kit.TableCell(VERDICTS.get(v, v), css="bad" * (v in (ELSEWHERE, UNSTEADY)))
+        for v in frame.verdict
+    ]
+    failed = [f"{k} of {n}" if k else "" for k, n in zip(frame.failed, frame.steps)]
+    known = frame.slope.notna()
+    shown = {"low": frame.low.where(known), "high": frame.high.where(known)}
+    parts = table("orders", frame, verdict=verdicts, failure=failed, **shown)
+    return [kit.Chart(svg, "", caption), parts, seeds_table("points", points)]

@@ -28,11 +28,12 @@ from crosscheck2d.reports.terminal.progress import Progress
 from crosscheck2d.reports.tune.score import (
     FAILED,
     HARMS,
-    Against,
+    MOST_OF_ALL,
     Make,
     TrialScores,
     against,
     cost_of,
+    faults_of,
     measured,
     posed,
 )
@@ -103,13 +104,12 @@ def tune(engines: Sequence[str], fresh: bool, out: Path) -> NoReturn:
 
 
 def show(table: pd.DataFrame) -> None:
-    rows = []
-    for _, row in table[table.verdict.isin([CHOSEN, BETTER, NO_BETTER, BREAKS])].iterrows():
-        numbers = [
-            "" if pd.isna(row[name]) else f"{row[name]:.3g}"
-            for name in ("equal_cost", "cost", "harmed")
-        ]
-        rows.append([f"{row.engine}, {row.setting}: {row.value}", *numbers, row.verdict])
+    tried = table[table.verdict != NO_SEARCH]
+    # harmed is text where a row has none
+    numbers = tried[["equal_cost", "cost", "harmed"]].apply(pd.to_numeric, errors="coerce")
+    numbers = numbers.map("{:.3g}".format).replace("nan", "")
+    names = tried.engine + ", " + tried.setting + ": " + tried.value
+    rows = pd.concat([names, numbers, tried.verdict], axis=1).to_numpy().tolist()
     headings = ["setting", "error", "cost\nof a step", "runs\nworse", "verdict"]
     title = "Errors at equal cost, and costs, as factors of those of the chosen settings"
     print_table(Console(), headings, rows, title, left=headings[-1:])
@@ -122,26 +122,15 @@ def searched_of(engine: str) -> Searched:
 
 
 class SettingsTrial(NamedTuple):
-    """One change of the chosen settings: its cost, what it is against them at equal cost, and, if
-    it is better, the probes that it does not keep."""
+    """One change of the chosen settings: its row of the table, and what it breaks."""
 
     change: dict[str, Any]
-    cost: float
-    result: Against
-    departs: list[str]
-
-    @property
-    def faults(self) -> list[str]:
-        return [*self.result.faults, *self.departs]
+    row: dict[str, Any]
+    faults: list[str]
 
     @property
     def verdict(self) -> str:
-        """Whether the change is taken: it is better by `LEAST`, or mends runs and is not worse by
-        as much; and it breaks nothing."""
-        error, mends = self.result.equal_cost, self.result.mends
-        if error >= (1 / LEAST if mends else LEAST):
-            return NO_BETTER
-        return BREAKS if self.faults else BETTER
+        return str(self.row["verdict"])
 
 
 @dataclass
@@ -183,16 +172,22 @@ class SettingsSearch:
         fails = (now.harm + before.harm)[one_a_family, -1, HARMS.index(FAILED)] > 0
         timed = [scene for scene, failed in zip(self.scenes[one_a_family], fails) if not failed]
         cost = cost_of(self.make(settings), self.make(self.chosen), timed)
-        result = against(now, before, cost, self.scenes)
-        trial = SettingsTrial(change, cost, result, [])
-        if trial.verdict == BETTER:
-            trial = trial._replace(departs=sorted(self.kept - self.keeps(settings)))
-        what = ", ".join(f"{name} {value:g}" for name, value in change.items())
+        numbers, faults = against(now, before, cost), faults_of(now, before, self.scenes)
+        # better by `LEAST`, or it mends runs and is not worse by as much
+        mends = numbers["harmed"] < -MOST_OF_ALL * now.error.size
+        verdict = BREAKS if faults else BETTER
+        if numbers["equal_cost"] >= (1 / LEAST if mends else LEAST):
+            verdict = NO_BETTER
+        elif not faults:
+            faults = sorted(self.kept - self.keeps(settings))
+            verdict = BREAKS if faults else BETTER
         self.say(
-            f"{self.engine} {what}: {result.equal_cost:.3f}, {result.harmed:+d} runs worse:"
-            f" {trial.verdict}"
+            f"{self.engine} {', '.join(f'{name} {value:g}' for name, value in change.items())}:"
+            f" {numbers['equal_cost']:.3f}, {numbers['harmed']:+d} runs worse: {verdict}"
         )
-        return trial
+        row = numbers | {"setting": " + ".join(change), "cost": cost, "verdict": verdict}
+        row |= {"value": " + ".join(map(format_value, change.values()))}
+        return SettingsTrial(change, row | {"chosen": False, "why": "; ".join(faults)}, faults)
 
     def groups(self) -> Iterator[list[dict[str, Any]]]:
         """The changes of each pair of settings that differ in both, and then of each setting: what
@@ -213,7 +208,7 @@ class SettingsSearch:
             trials += group
             better = [each for each in group if each.verdict == BETTER]
             if better:
-                best = min(better, key=lambda each: each.result.equal_cost)
+                best = min(better, key=lambda each: each.row["equal_cost"])
                 self.chosen |= best.change
                 self.say(f"{self.engine}: {best.change} is taken")
                 taken = True
@@ -240,37 +235,16 @@ def table(
     rows: list[dict[str, Any]] = []
     for name, (_, meaning) in searched.settings.items():
         others = [trial for trial in trials if list(trial.change) == [name]]
-        best = min(others, key=lambda trial: np.nan_to_num(trial.result.equal_cost, nan=np.inf))
-        reason = f"{format_value(best.change[name])}: {best.result.equal_cost:.2f} times the error"
-        reason += f", but {best.faults[0]}" if best.verdict == BREAKS else ""
-        rows.append(
-            {
-                "setting": name,
-                "value": format_value(chosen[name]),
-                "chosen": True,
-                "verdict": CHOSEN,
-                "why": f"{meaning}. Next best is {reason}",
-            }
-        )
-        rows += map(row_of, others)
-    rows += [row_of(trial) for trial in trials if len(trial.change) > 1]
-    rows += [
-        {"setting": name, "chosen": False, "verdict": NO_SEARCH, "why": reason}
-        for name, reason in searched.left_alone.items()
-    ]
+        best = min(others, key=lambda trial: np.nan_to_num(trial.row["equal_cost"], nan=np.inf))
+        why = f"{meaning}. Next best is {best.row['value']}: {best.row['equal_cost']:.2f} times the"
+        why += " error" + (f", but {best.faults[0]}" if best.verdict == BREAKS else "")
+        row = {"setting": name, "value": format_value(chosen[name]), "chosen": True}
+        rows.append(row | {"verdict": CHOSEN, "why": why})
+        rows += [trial.row for trial in others]
+    rows += [trial.row for trial in trials if len(trial.change) > 1]
+    for name, reason in searched.left_alone.items():
+        rows.append({"setting": name, "chosen": False, "verdict": NO_SEARCH, "why": reason})
     return pd.DataFrame([{"engine": engine} | row for row in rows], columns=COLUMNS).round(4)
-
-
-def row_of(trial: SettingsTrial) -> dict[str, Any]:
-    numbers = ("same_dt", "equal_cost", "better", "worse", "of", "harmed")
-    return {name: getattr(trial.result, name) for name in numbers} | {
-        "setting": " + ".join(trial.change),
-        "value": " + ".join(map(format_value, trial.change.values())),
-        "chosen": False,
-        "cost": trial.cost,
-        "verdict": trial.verdict,
-        "why": "; ".join(trial.faults),
-    }
 
 
 def format_value(value: Any) -> str:

@@ -20,7 +20,7 @@ from collections.abc import Callable, Sequence
 from contextlib import closing
 from functools import cache
 from time import thread_time
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,34 +64,6 @@ class TrialScores(NamedTuple):
     harm: Array
 
 
-class Against(NamedTuple):
-    """What some settings are against those that are compared with.
-
-    Attributes:
-        same_dt: geometric mean over scenes and steps of error over error, at the same step size.
-        equal_cost: the same, at equal cost.
-        better, worse: how many of the scenes and steps have an error at equal cost smaller or
-            larger by 20 %.
-        of: how many there are.
-        harmed: runs that get worse, less those that get better.
-        runs: how many there are.
-        faults: what breaks the bounds: the number of runs, and of the worst its scene and number.
-    """
-
-    same_dt: float
-    equal_cost: float
-    better: int
-    worse: int
-    of: int
-    harmed: int
-    runs: int
-    faults: list[str]
-
-    @property
-    def mends(self) -> bool:
-        return self.harmed < -MOST_OF_ALL * self.runs
-
-
 @cache
 def posed(families: tuple[str, ...], seeds: tuple[int, ...]) -> tuple[Asked, ...]:
     """The tuning scenes with their exact answers, which are cut at their horizons; family by
@@ -129,22 +101,27 @@ def of_run(
     return max(error, FLOOR), [*harm.values()]
 
 
-def against(now: TrialScores, before: TrialScores, cost: float, scenes: Sequence[Asked]) -> Against:
-    """Set `now` against `before`, if its steps cost `cost` times as much."""
+def against(now: TrialScores, before: TrialScores, cost: float) -> dict[str, Any]:
+    """`now` against `before`, if its steps cost `cost` times as much.
+
+    same_dt, equal_cost: geometric mean over scenes and steps of error over error, at the same step
+        size and at equal cost.
+    better, worse: how many of the scenes and steps, `of`, have an error at equal cost smaller or
+        larger by 20 %.
+    harmed: runs that get worse, less those that get better.
+    """
     at_its_cost = at_cost(now.error, cost)
     both = np.isfinite(now.error) & np.isfinite(at_its_cost) & np.isfinite(before.error)
     had = np.log(before.error[both])
     same, equal = np.log(now.error[both]) - had, np.log(at_its_cost[both]) - had
-    counts = int((equal < np.log(0.8)).sum()), int((equal > np.log(1.25)).sum()), int(both.sum())
-    change = changes(now, before)
-    return Against(
-        float(np.exp(same.mean())),
-        float(np.exp(equal.mean())),
-        *counts,
-        int(change.sum()),
-        change.size,
-        faults_of(now, before, scenes),
-    )
+    return {
+        "same_dt": float(np.exp(same.mean())),
+        "equal_cost": float(np.exp(equal.mean())),
+        "better": int((equal < np.log(0.8)).sum()),
+        "worse": int((equal > np.log(1.25)).sum()),
+        "of": int(both.sum()),
+        "harmed": int(changes(now, before).sum()),
+    }
 
 
 def at_cost(error: Array, cost: float) -> Array:
@@ -164,15 +141,15 @@ def at_cost(error: Array, cost: float) -> Array:
     return points
 
 
-def increases(now: Array, before: Array) -> NDArray[np.int64]:
-    """1 where there is a harm that was not, or by more than 1 more than before; 0 elsewhere."""
-    return np.where(before == 0, now > 0, now > before + 1).astype(np.int64)
+def increases(now: Array, before: Array) -> NDArray[np.bool_]:
+    """Whether there is a harm that was not, or by more than 1 more than before."""
+    return np.where(before == 0, now > 0, now > before + 1)
 
 
 def changes(now: TrialScores, before: TrialScores) -> NDArray[np.int64]:
     """(s, k) 1 where a run gets worse, -1 where it gets better, 0 where neither or both."""
-    worse = increases(now.harm, before.harm) - increases(before.harm, now.harm)
-    change: NDArray[np.int64] = np.clip(worse.sum(axis=2), -1, 1)
+    worse, better = increases(now.harm, before.harm), increases(before.harm, now.harm)
+    change: NDArray[np.int64] = np.sign(worse.sum(axis=2) - better.sum(axis=2))
     return change
 
 

@@ -54,16 +54,18 @@ def measured_anew(scene: str, progress: Progress) -> tuple[str, bool]:
         able, _ = asked.to_the_end(those_that_keep(tried, BOUND))
         every = asked.from_every_start(able)
         keeping += [one for one in every if one.holds(BOUND)]
-    if not advice.keeping or not keeping:
-        return "none", not advice.keeping and not keeping
+    advised = advice["cheapest_first"]
+    if not advised or not keeping:
+        return "none", not advised and not keeping
     again, apart, _ = asked.timed(keeping)
     cheapest = min(again, key=lambda one: one.cost)
-    best = min(advice.keeping, key=lambda one: one.cost)
-    same = [one for one in again if (one.name, one.substeps) == (best.name, best.substeps)]
+    best = min(advised, key=lambda row: row["us_per_simulated_s"])
+    same = [one for one in again if (one.name, one.dt) == (best["engine"], best["dt_s"])]
     ratio = same[0].cost / cheapest.cost if same else float("inf")
-    noise = max(far for (name, _), far in apart.items() if name in (best.name, cheapest.name))
+    name, other = best["engine"], cheapest.name
+    noise = max(far for (who, _), far in apart.items() if who in (name, other))
     least = f"{cheapest.name} at {cheapest.dt:.3g} s"
-    said = f"{best.name} at {best.dt:.3g} s, {ratio:.2f} of the least ({least}; noise {noise:.0%})"
+    said = f"{name} at {best['dt_s']:.3g} s, {ratio:.2f} of the least ({least}; noise {noise:.0%})"
     return said, log(ratio) <= max(noise, LOUD)
 
 

@@ -30,11 +30,12 @@ from crosscheck2d.reports.speed.advice import (
     NOT_COMPARED,
     SAVES_TIME,
     TOO_FAR_OFF,
-    Advice,
     Attempt,
-    ChangedOption,
     Inquiry,
     Requirement,
+    change_row,
+    floor_of,
+    ranked_rows,
     those_that_keep,
 )
 from crosscheck2d.reports.speed.advise import print_advice, sentence_on_times
@@ -47,7 +48,22 @@ from tests.reports.terminal.command_line import crosscheck
 
 SCENES = Path(__file__).parents[3] / "tests" / "data" / "scenes"
 attempt = partial(Attempt, "pymunk:matched", PLAIN)
-given = partial(Advice, "a", "trajectory", 1.0)
+ANSWER = {
+    "scenario": "a",
+    "purpose": "trajectory",
+    "error_at_most": 1.0,
+    "until_s": 1.0,
+    "duration_s": 1.0,
+    "collisions_judged": 0,
+    "dt_s_tried": [0.1, 0.05],
+    "cheapest_first": [],
+    "not_within": [],
+    "not_to_the_end": [],
+    "changes": [],
+    "noise": 0.0,
+    "cores_busy": 0.0,
+    "statistics": None,
+}
 
 
 @drawn(st.lists(st.floats(0, 2) | st.sampled_from([inf, nan]), min_size=1, max_size=9))
@@ -79,11 +95,11 @@ def test_a_change_is_judged_by_its_error_first_and_then_by_its_cost(
     # Set against an error of 0.5 within 1 and a cost of 1 s; a saving within the noise is none.
     plain = attempt(1, 0.1, 0.5, starts=(0.4, 0.5, 0.6), cost=1.0)
 
-    changed = ChangedOption(plain, attempt(1, 0.1, error, starts=(error,) * 3, cost=cost))
-    assert changed.verdict(1.0, 0.05) == verdict
+    changed = attempt(1, 0.1, error, starts=(error,) * 3, cost=cost)
+    assert change_row(plain, changed, 1.0, 0.05)["verdict"] == verdict
     # on a busy machine nothing is said of the cost
     unknown = NOT_COMPARED if verdict in (SAVES_TIME, NO_GAIN) else verdict
-    assert changed.verdict(1.0, inf) == unknown
+    assert change_row(plain, changed, 1.0, inf)["verdict"] == unknown
 
 
 def test_an_option_is_judged_by_its_errors_from_all_starts():
@@ -91,9 +107,10 @@ def test_an_option_is_judged_by_its_errors_from_all_starts():
     plain = attempt(1, 0.1, 0.5, starts=(0.4, 0.5, 0.6), cost=1.0)
     lucky = attempt(1, 0.1, 0.01, starts=(0.01, 0.5, 0.6), cost=1.0)
 
-    assert ChangedOption(plain, lucky).verdict(1.0, 0.1) == NO_GAIN
-    assert ChangedOption(plain, replace(lucky, starts=(0.1,) * 3)).verdict(1.0, 0.1) == NEARER
-    assert ChangedOption(plain, lucky).verdict(0.55, 0.1) == TOO_FAR_OFF  # from 2 of 3
+    nearer = replace(lucky, starts=(0.1,) * 3)
+    assert change_row(plain, lucky, 1.0, 0.1)["verdict"] == NO_GAIN
+    assert change_row(plain, nearer, 1.0, 0.1)["verdict"] == NEARER
+    assert change_row(plain, lucky, 0.55, 0.1)["verdict"] == TOO_FAR_OFF  # from 2 of 3
 
 
 @pytest.mark.parametrize(("kept", "holds"), [(20, True), (18, True), (17, False)])
@@ -109,11 +126,11 @@ def test_costs_within_the_floor_are_ties():
     names = ["pymunk:matched", "box2d:matched", "planck:matched", "reference:ordered"]
     costs = [1.0, 1.09, 1.2, 0.1]
     keeping = [Attempt(n, PLAIN, 1, 0.1, 0.5, cost=c) for n, c in zip(names, costs)]
-    advice = given(1, 1, 0, [1], keeping, [], [], [], noise=0.05, busy=0.0)
+    quiet, busy = (ranked_rows(keeping, 1.0, floor_of(0.05, cores)) for cores in (0.0, 1.0))
 
-    assert [rank for rank, _ in advice.ranked] == [1, 1, 3, 1]
-    assert [one.name for _, one in advice.ranked] == names
-    assert [rank for rank, _ in replace(advice, busy=1.0).ranked] == [1, 1, 1, 1]
+    assert [row["rank"] for row in quiet] == [1, 1, 3, 1]
+    assert [row["engine"] for row in quiet] == names
+    assert [row["rank"] for row in busy] == [1, 1, 1, 1]
 
 
 @pytest.mark.parametrize("name", SCENARIOS)
@@ -141,7 +158,7 @@ def test_what_a_step_keeps_by_luck_is_not_kept_from_nine_tenths_of_its_starts():
     )
 
     untils = [
-        begin + requirement.play_part(part, coarse).until
+        begin + requirement.play(coarse, part).until
         for begin, part in starts_within_a_step(scene, 0, coarse.dt)
     ]
 
@@ -182,14 +199,15 @@ def test_an_engine_that_stops_before_the_end_of_the_scene_is_no_advice():
 
 
 def test_it_says_why_times_cannot_be_compared():
-    keeping = [attempt(1, 0.1, 0.5)]
-    advice = given(1, 1, 0, [1], keeping, [], [], [], noise=0.01, busy=1.9)
+    busy = ANSWER | {"noise": 0.01, "cores_busy": 1.9}
 
-    assert sentence_on_times(advice).startswith("Other programs keep 1.9 of ")
-    assert "differ" not in sentence_on_times(advice)
-    loud = sentence_on_times(replace(advice, noise=0.2))
+    assert sentence_on_times(busy).startswith("Other programs keep 1.9 of ")
+    assert "differ" not in sentence_on_times(busy)
+    loud = sentence_on_times(busy | {"noise": 0.2})
     assert loud.startswith("Two timings of the same engine differ by 20%, and other programs keep")
-    assert sentence_on_times(replace(advice, busy=0.0)).startswith("Two timings of the same engine")
+    assert sentence_on_times(busy | {"cores_busy": 0.0}).startswith(
+        "Two timings of the same engine"
+    )
 
 
 @pytest.mark.parametrize(
@@ -212,10 +230,11 @@ def test_it_says_what_part_of_the_scene_is_judged(
     until: float, collisions: int, says: list[str], capsys: pytest.CaptureFixture[str]
 ):
     plain = attempt(1, 0.1, 0.5, starts=(0.5,) * STARTS, cost=1.0)
-    changes = [ChangedOption(plain, replace(plain, change="sleeping"))]
-    advice = given(until, 3.0, collisions, [0.1, 0.05], [plain], [], [], changes, 0.0, 0.0)
+    part = {"until_s": until, "duration_s": 3.0, "collisions_judged": collisions}
+    rows = {"cheapest_first": ranked_rows([plain], 1.0, 0.1)}
+    rows |= {"changes": [change_row(plain, replace(plain, change="sleeping"), 1.0, 0.1)]}
     with mock.patch.dict(os.environ, {"COLUMNS": "200"}):
-        print_advice(advice)
+        print_advice(ANSWER | part | rows)
     printed = capsys.readouterr().out
 
     assert all(each in re.sub(" *\n", "\n", printed) for each in says)

@@ -65,7 +65,7 @@ def rows_of(table: Table) -> list[dict[str, str]]:
 def test_a_point_that_was_not_timed_has_its_error_and_a_failed_one_how_it_failed():
     rows = [point(), point(step_size=1, cost=np.nan, error=0.05)]
     table = pd.DataFrame([*rows, point(step_size=2, cost=np.nan, error=np.inf)])
-    timed, untimed, failed = rows_of(page.points_table(table))
+    timed, untimed, failed = rows_of(page.seeds_table("points", table))
     (drawn,) = [line for line in page.drawn_lines(table) if not line.faint]
 
     assert (timed["error, radii"], timed["cost, µs/s"], timed["failed"]) == ("0.1", "1", "")
@@ -85,12 +85,12 @@ def test_a_sweep_that_fails_most_scenes_stays_in_the_pool_and_in_the_table():
     rows = (point(step_size=2), sweep("1", 0), failed)
     table = pd.DataFrame([row | {"scenario": name} for name in ("one", "two") for row in rows])
     pool, _ = tables.pooled_sweeps(table)
-    lost = [row for row in rows_of(page.sweeps_table(table)) if row["failed"]]
+    lost = [row for row in rows_of(page.seeds_table("sweeps", table)) if row["failed"]]
 
     assert pool.set_index("change").failed.to_dict() == {"": 0, "1": 0, "9": 2}
     assert [(row[""], row["value"], row["failed"]) for row in lost] == [
-        ("one", "9", "error: no"),
-        ("two", "9", "error: no"),
+        ("one", "9", "1 of 1: error: no"),
+        ("two", "9", "1 of 1: error: no"),
     ]
 
 
@@ -113,7 +113,7 @@ def test_a_change_that_fails_has_its_row_with_how_it_failed():
     columns = ["scenario", "status", "reason", "error_ratio", "cost_ratio", "error_radii"]
     table = pd.DataFrame(rows, columns=columns)
     table = table.assign(**PYMUNK | {"change": "no rotation"}, error_radii_plain=0.1)
-    ok, failed = rows_of(page.options_table(table))
+    ok, failed = rows_of(page.table("options", table))
 
     assert (ok["scene"], ok["error, × unchanged"], ok["failed"]) == ("one", "1.5", "")
     assert (failed["scene"], failed["failed"]) == ("two", "error: no")
@@ -123,7 +123,7 @@ def test_an_engine_that_refuses_the_fewest_disks_has_its_row_and_its_reason():
     sample = PYMUNK | {"kind": SIZE, "n": 3, "round": 0, "cost": 1e-6, "wrapping": 0.0}
     refused = {("box2d:matched", 3): "refused: no"}
     growth = tables.growth(tables.sizes(Measured(samples=pd.DataFrame([sample]))), refused)
-    rows = rows_of(page.growth_table(growth))
+    rows = rows_of(page.table("growth", growth))
 
     assert growth.set_index("engine").stopped.to_dict() == {"pymunk": "", "box2d": "3: refused: no"}
     assert [(row[""], row["then"]) for row in rows] == [

@@ -26,6 +26,7 @@ from crosscheck2d.reports.tune.command import (
     SettingsSearch,
     format_value,
     searched_of,
+    show,
 )
 from crosscheck2d.reports.tune.score import (
     FLOOR,
@@ -92,6 +93,15 @@ def test_every_value_of_the_grid_is_in_the_table_and_every_reason_is_given():
     assert not [row for row in TABLE if row["verdict"] == BETTER]  # the last sweep took nothing
 
 
+def test_the_table_is_printed_with_what_is_chosen_and_tried(capsys: pytest.CaptureFixture[str]):
+    show(pd.DataFrame(TABLE[:9]))
+    printed = capsys.readouterr().out
+
+    assert f"{TABLE[0]['engine']}, {TABLE[0]['setting']}: {TABLE[0]['value']}" in printed
+    assert CHOSEN in printed
+    assert NO_SEARCH not in printed
+
+
 def test_the_tuning_scenes_are_not_those_of_the_suite():
     suite = [scenario(name) for name in SCENARIOS]
     mine = [one_of(family, seed) for family in FAMILIES for seed in range(2)]
@@ -142,15 +152,16 @@ def test_equal_cost_is_a_step_as_much_longer_as_it_costs(cost: float):
     first = played(0.1)
 
     assert at_cost(first.error, cost) == pytest.approx(cost * first.error)
-    assert against(first, first, cost, THREE).equal_cost == pytest.approx(cost)
-    assert against(first, first, cost, THREE).same_dt == 1.0
+    assert against(first, first, cost)["equal_cost"] == pytest.approx(cost)
+    assert against(first, first, cost)["same_dt"] == 1.0
 
 
 def test_an_error_of_no_order_gains_nothing_from_cheaper_steps_within_the_ladder():
     flat = played(0.1, order=0.0)
 
     assert at_cost(flat.error, 2.0)[:, 1:] == pytest.approx(flat.error[:, 1:])
-    assert against(played(0.05), played(0.1), 1.0, THREE)[:5] == pytest.approx((0.5, 0.5, 9, 0, 9))
+    half = {"same_dt": 0.5, "equal_cost": 0.5, "better": 9, "worse": 0, "of": 9, "harmed": 0}
+    assert against(played(0.05), played(0.1), 1.0) == pytest.approx(half)
 
 
 @pytest.mark.parametrize(
@@ -167,13 +178,13 @@ def test_what_breaks_a_family_is_refused_whatever_the_error(harm: dict[str, floa
 
     assert fault == f"flight_alone: 9 of 9 runs worse, flight_alone-0 at 16.7 ms: {words}"
     assert faults_of(played(0.01), played(0.1, **harm), THREE) == []
-    assert against(played(0.01), played(0.1, **harm), 1.0, THREE).mends
+    assert against(played(0.01), played(0.1, **harm), 1.0)["harmed"] == -9
 
 
 def test_a_harm_counts_if_it_is_new_or_a_bound_larger():
     for now, before, worse in [(1.9, 1.0, 0), (2.1, 1.0, 9), (30.0, 28.5, 9), (1.0, 0.0, 9)]:
         harms = (played(0.1, energy_gained=value) for value in (now, before))
-        assert against(*harms, 1.0, THREE).harmed == worse
+        assert against(*harms, 1.0)["harmed"] == worse
 
 
 def test_fewer_runs_than_a_third_of_a_family_may_get_worse_if_few_do_in_all():
@@ -236,7 +247,7 @@ def test_a_smaller_slop_brings_a_column_in_pymunk_nearer():
         for slop in (1e-2, 1e-6)
     )
 
-    assert against(now, before, 1.0, scenes).same_dt < 0.5
+    assert against(now, before, 1.0)["same_dt"] < 0.5
     assert (before.error > FLOOR).all()
 
 
