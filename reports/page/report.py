@@ -36,7 +36,7 @@ from crosscheck2d.reports.page.scenes import is_library, label, long_label
 from crosscheck2d.reports.page.summary import Summary, error_text, run_times, step_text, summarize
 from crosscheck2d.reports.page.trade_offs import cost_against_size, error_against_cost, limits
 from crosscheck2d.reports.run.results import RunResults
-from crosscheck2d.reports.run.tables import make_tables
+from crosscheck2d.reports.run.tables import comparisons_of, make_tables
 from crosscheck2d.reports.run.timing_pass import TIMINGS, noise_floor
 from crosscheck2d.reports.terminal.counts import counted
 
@@ -77,8 +77,9 @@ def make_report(results: RunResults, say: Callable[[str], None]) -> Report:
     header = results.header
     tables = make_tables(results, say)
     say("writing the page")
+    comparisons = [*comparisons_of(results, tables)]
     # an interrupt may come first
-    began = {run.name for comparison in tables.comparisons for run in comparison.runs}
+    began = {run.name for comparison in comparisons for run in comparison.runs}
     engines = [name for name in header["engines"] if name in began and name in results.conformance]
     probes = [results.conformance[name] for name in engines]
     broken = {
@@ -95,7 +96,7 @@ def make_report(results: RunResults, say: Callable[[str], None]) -> Report:
     last = findings.not_counted({name: row for name, row in broken.items() if name not in own})
     limit, again = header["timings"], take_times(results.folder)
     times = run_times(tables.timed, noise_floor(results), limit, again)
-    summary = summarize(tables.comparisons, untrusted, times)
+    summary = summarize(comparisons, untrusted, times)
     cells = counted(len(results.records), "cell")
     unfinished = "" if results.complete else f"The run was stopped after {cells}."
     checks = results.checked

@@ -35,15 +35,16 @@ class Tables(NamedTuple):
     Attributes:
         runs: runs.csv.
         timed: timings.csv.
-        comparisons: of the scenes of which any cell has ended, in reading order. Only runs at the
-            middle dt have their trajectories, because no others are drawn.
+        answers, parts: scene of which any cell has ended -> its exact answer, its part of
+            deviations.csv.
         unjudged: name of a scene -> why it is not compared with its answer, or not at all, though
             it should be.
     """
 
     runs: pd.DataFrame
     timed: pd.DataFrame
-    comparisons: list[Comparison]
+    answers: dict[str, comparing.ExactAnswer]
+    parts: dict[str, bytes]
     unjudged: dict[str, str]
 
 
@@ -63,28 +64,24 @@ def make_tables(results: RunResults, say: Callable[[str], None]) -> Tables:
             )
     compared = compare_scenes(results, say)
     say("writing the tables")
-    store, parts, comparisons, unjudged = results.store, list[bytes](), [], dict[str, str]()
+    store, parts, unjudged = results.store, dict[str, bytes](), dict[str, str]()
+    answers = {scene: answer for scene, (answer, _) in compared.items()}
     for scene, (answer, table) in compared.items():
-        reason, failed = answer.lost, isinstance(table, Failure)
+        reason = answer.lost
         if isinstance(table, Failure):
             reason = not_compared(table)
-            answer = comparing.ExactAnswer(None, table.status, reason)
-        scenario, truth = answered(answer.put_into(results.sources[scene].scenario()))
-        records, middle = results.by_scene[scene], scenario.middle_substeps
-        runs = [results.run(record, record["substeps"] == middle) for record in records]
-        if isinstance(table, Failure):
+            answers[scene] = comparing.ExactAnswer(None, table.status, reason)
+            runs = [results.run(record, False) for record in results.by_scene[scene]]
             table = comparing.csv_of(comparing.rows_not_judged(runs, reason, ITSELF))
+        parts[scene] = table
         if reason:
-            unjudged[scenario.name] = reason
-        # as one table, whose header stands only once
-        parts.append(table.partition(b"\n")[2] if parts else table)
-        table = comparing.read_scene_table(table)
-        comparisons.append(Comparison(scenario, truth, runs, table))
-    whole = encoded(b"".join(parts).decode(errors=comparing.PATHS))
+            unjudged[results.sources[scene].name] = reason
+    rows = [part.partition(b"\n")[2] if k else part for k, part in enumerate(parts.values())]
+    whole = encoded(b"".join(rows).decode(errors=comparing.PATHS))
     store.put("run", "table", None, whole)
     store.export("deviations.csv", whole)
-    runs = table_of_runs(results.records)
-    store.export("runs.csv", runs.to_csv(index=False))
+    played = table_of_runs(results.records)
+    store.export("runs.csv", played.to_csv(index=False))
     timed = timings(results)
     store.export(TABLE, timed.to_csv(index=False, float_format="%.6g"))
     names = set()
@@ -93,7 +90,19 @@ def make_tables(results: RunResults, say: Callable[[str], None]) -> Tables:
             names.add(name := f"trajectories/{record['cell']}.npz")
             store.export(name, file)
     store.delete_exports("trajectories", names)  # those of other plans
-    return Tables(runs, timed, comparisons, unjudged)
+    return Tables(played, timed, answers, parts, unjudged)
+
+
+def comparisons_of(results: RunResults, tables: Tables) -> Iterator[Comparison]:
+    """The comparisons in reading order. Only runs at the middle dt have their trajectories, because
+    no others are drawn."""
+    for scene, answer in tables.answers.items():
+        scenario, truth = answered(answer.put_into(results.sources[scene].scenario()))
+        middle = scenario.middle_substeps
+        runs = [
+            results.run(record, record["substeps"] == middle) for record in results.by_scene[scene]
+        ]
+        yield Comparison(scenario, truth, runs, comparing.read_scene_table(tables.parts[scene]))
 
 
 def compare_scenes(

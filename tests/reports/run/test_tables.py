@@ -17,7 +17,7 @@ from crosscheck2d.reports.run.comparing import ANSWER, COMPARED, CompareTask, an
 from crosscheck2d.reports.run.pool import Failure
 from crosscheck2d.reports.run.results import COMMAND, RunResults
 from crosscheck2d.reports.run.store import Store, reading, writing
-from crosscheck2d.reports.run.tables import make_tables
+from crosscheck2d.reports.run.tables import comparisons_of, make_tables
 from crosscheck2d.scenarios.truth import cache
 from tests.reports.run.small_runs import make
 
@@ -59,7 +59,9 @@ def test_all_is_compared_while_it_is_played(played: Path):
 def test_what_is_kept_is_what_is_compared(store: Store):
     results = RunResults.read(store)
     made = make_tables(results, silent)
-    for (scene, records), comparison in zip(results.by_scene.items(), made.comparisons):
+    for (scene, records), comparison in zip(
+        results.by_scene.items(), comparisons_of(results, made)
+    ):
         source = results.sources[scene]
         csv = CompareTask(store, source, records, comparing.compute_answer(source))()
 
@@ -113,7 +115,7 @@ def test_a_comparison_that_fails_is_a_row_a_run_and_leaves_the_other_scene(
     made = make_tables(results, silent)
     table = pd.read_csv(store.folder / "deviations.csv")
     failed = table[table.scenario == "slow_collision"]
-    one, other = made.comparisons
+    one, other = comparisons_of(results, made)
 
     assert made.unjudged == {"slow_collision": WHY}
     assert set(failed.metric) == {"status"}
