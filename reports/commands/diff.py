@@ -182,7 +182,7 @@ def warnings_of(
     for run, own, other in zip(runs, cells, reversed(cells)):
         rest = own[~own.set_index(CELL).index.isin(other.set_index(CELL).index)]
         if len(rest):
-            engines, scenes = map(some_of, (rest.name.unique(), rest.scenario.unique()))
+            engines, scenes = map(some_of, ([*rest.name.unique()], [*rest.scenario.unique()]))
             warnings.append(
                 f"only in {run.folder}: {counted(len(rest), 'cell')} of {engines}, in {scenes}"
             )
@@ -204,7 +204,7 @@ def changed_statuses(both: pd.DataFrame) -> pd.DataFrame:
     verdict = np.select(
         [rows.status == "ok", rows.status_after == "ok"], ["worse", "better"], "other"
     )
-    values = {"before": rows.status, "after": rows.status_after, "verdict": verdict}
+    values: dict[str, Any] = {"before": rows.status, "after": rows.status_after, "verdict": verdict}
     return rows[CELL].assign(kind="status", what="status", **values)
 
 
@@ -215,11 +215,13 @@ def changed_judgement(
     reasons = [table[table.metric == "status"][[*WHOSE, "note"]] for table in (before, after)]
     rows = reasons[0].merge(reasons[1], on=WHOSE, how="outer", suffixes=("", "_after"))
     rows["name"] = rows.engine + ":" + rows.profile
-    rows = rows[(rows.note.isna() != rows.note_after.isna()) & are_in(played, rows, rows.name)]
+    rows = rows.loc[
+        (rows.note.isna() != rows.note_after.isna()) & are_in(played, rows, rows.name)
+    ].copy()
     values = {name: rows[column].fillna("judged") for name, column in NOTES.items()}
     verdict = np.where(rows.note.isna(), "worse", "better")
-    what = "against " + rows.versus + ": status"
-    return rows[CELL].assign(kind="status", what=what, verdict=verdict, **values)
+    rows["what"] = "against " + rows.versus + ": status"
+    return rows[[*CELL, "what"]].assign(kind="status", verdict=verdict, **values)
 
 
 def are_in(cells: pd.DataFrame, rows: pd.DataFrame, names: pd.Series) -> Any:
@@ -274,17 +276,18 @@ def changed_numbers(
     what = rows.metric + " against " + rows.versus
     what += np.where(must_agree, " (same cell, other bits)", "")
     values = {name: rows[column].replace("", NOT_JUDGED) for name, column in VALUES.items()}
-    factor = (large / small).where((small > 0) & np.isfinite(large), np.inf)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        factor = np.where((small > 0) & np.isfinite(large), large / small, np.inf)
     about = {"kind": "number", "what": what, "verdict": verdict, "factor": factor}
     return rows[[*CELL, "beside"]].assign(**values, **about), same
 
 
-def is_rounding(name: pd.Series, second: pd.Series, was: pd.Series, now: pd.Series) -> pd.Series:
+def is_rounding(name: pd.Series, second: pd.Series, was: pd.Series, now: pd.Series) -> Any:
     """Whether two numbers of an engine, or of two, differ by no more than their rounding."""
     rounding = np.maximum(name.map(rounding_of), second.map(rounding_of)).astype(float)
     large = np.maximum(was.abs(), now.abs())
     bound = np.maximum(DIVERGED, ROUNDINGS * rounding)
-    return np.isfinite(large) & ((now - was).abs() <= bound * large.clip(lower=1.0))
+    return np.isfinite(large) & ((now - was).abs() <= bound * np.maximum(large, 1.0))
 
 
 def timings_of(first: RunResults, second: RunResults, both: pd.DataFrame) -> dict[str, Timing]:

@@ -274,7 +274,7 @@ def medians(
         fails = sum(bool(scene.verdicts(name)) for scene in scenes)
         played = len(scenes) - refused
         texts = {np.inf: "fails" if fails else "not played"}
-        middle = [float(frame.loc[name].median()) for frame in scores.values()]
+        middle = [frame.median(axis=1)[name] for frame in scores.values()]
         cells = ["–" if np.isnan(value) else texts.get(value, number(value)) for value in middle]
         cells.append(f"{fails} of {played}" if played else "–")
         if name in untrusted:
