@@ -221,7 +221,8 @@ def changed_judgement(
     values = {name: rows[column].fillna("judged") for name, column in NOTES.items()}
     verdict = np.where(rows.note.isna(), "worse", "better")
     rows["what"] = "against " + rows.versus + ": status"
-    return rows[[*CELL, "what"]].assign(kind="status", verdict=verdict, **values)
+    changes: pd.DataFrame = rows[[*CELL, "what"]].assign(kind="status", verdict=verdict, **values)
+    return changes
 
 
 def are_in(cells: pd.DataFrame, rows: pd.DataFrame, names: pd.Series) -> Any:
@@ -278,7 +279,7 @@ def changed_numbers(
     values = {name: rows[column].replace("", NOT_JUDGED) for name, column in VALUES.items()}
     with np.errstate(divide="ignore", invalid="ignore"):
         factor = np.where((small > 0) & np.isfinite(large), large / small, np.inf)
-    about = {"kind": "number", "what": what, "verdict": verdict, "factor": factor}
+    about: dict[str, Any] = {"kind": "number", "what": what, "verdict": verdict, "factor": factor}
     return rows[[*CELL, "beside"]].assign(**values, **about), same
 
 
