@@ -21,12 +21,10 @@ app = typer.Typer(
         "Play the same scenes of 2D disks through several physics engines, and measure each against"
         " the exact answer. Without a command: all scenes, all engines, to reports/out/latest/."
     ),
-    no_args_is_help=False,
     add_completion=False,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-DEFAULT_OUT = Path("reports/out/latest")
 VARIED = "dt, speed, mass_ratio, restitution, scale, offset"
 
 
@@ -40,53 +38,29 @@ def place(text: str) -> Path:
 
 path_option = partial(Option, metavar="PATH", parser=place)
 path_argument = partial(Argument, parser=place)
+SCENE = "SCENARIO|FILE.toml"
 AsJson = Annotated[bool, Option("--json", help="Print JSON.")]
+ENGINES = (
+    "Play only this engine: a name, at a version such as pymunk@6.8.1, or a file of your own."
+    " Repeatable."
+)
 Engines = Annotated[
-    list[str] | None,
-    Option(
-        "--engine",
-        metavar="NAME[@VERSION][:PROFILE]|FILE",
-        help="Play only this engine: a name, at a version such as pymunk@6.8.1, or a file of your"
-        " own. Repeatable.",
-    ),
+    list[str] | None, Option("--engine", metavar="NAME[@VERSION][:PROFILE]|FILE", help=ENGINES)
 ]
 Seed = Annotated[int, Option(min=0, metavar="N", help="Seed of random scenes.")]
-Results = Annotated[
-    Path,
-    Option(
-        metavar="DIR",
-        help="Folder for the results. What was measured there before is not measured again.",
-    ),
-]
+RESULTS = "Folder for the results. What was measured there before is not measured again."
+Results = Annotated[Path, Option(metavar="DIR", help=RESULTS)]
 Fresh = Annotated[bool, Option("--fresh", help="Ignore the results that --out has.")]
-OneScene = Annotated[
-    str,
-    Argument(metavar="SCENARIO|FILE.toml", help="A scene: a name of crosscheck list, or a file."),
-]
-Workers = Annotated[
-    int, Option(min=0, metavar="N", help="Number of processes; 0: one for each core.")
-]
-Timeout = Annotated[
-    float,
-    Option(
-        min=0.1,
-        max=1e6,
-        metavar="S",
-        help=(
-            "Time limit of each cell and of each exact answer. A cell is stopped even in C code; an"
-            " exact answer ends earlier."
-        ),
-    ),
-]
-Port = Annotated[
-    int,
-    Option(
-        min=1,
-        max=65535,
-        metavar="N",
-        help="Port on this machine; if it is in use, the next free one.",
-    ),
-]
+OneScene = Annotated[str, Argument(metavar=SCENE, help="A name of crosscheck list, or a file.")]
+WORKERS = "Number of processes; 0: one for each core."
+Workers = Annotated[int, Option(min=0, metavar="N", help=WORKERS)]
+TIMEOUT = (
+    "Time limit of each cell and of each exact answer. A cell is stopped even in C code; an exact"
+    " answer ends earlier."
+)
+Timeout = Annotated[float, Option(min=0.1, max=1e6, metavar="S", help=TIMEOUT)]
+PORT = "Port on this machine; if it is in use, the next free one."
+Port = Annotated[int, Option(min=1, max=65535, metavar="N", help=PORT)]
 Opens = Annotated[bool, Option("--open", help="Open the page in a browser.")]
 
 
@@ -105,24 +79,15 @@ def default(context: typer.Context) -> None:
 @app.command()
 def run(
     scenes: list[str] | None = Argument(
-        None,
-        metavar="SCENARIO|FILE.toml",
-        help="Scenes: names of crosscheck list, or files. Default: all scenarios.",
+        None, metavar=SCENE, help="Names of crosscheck list, or files. Default: all scenarios."
     ),
     engine: Engines = None,
     dt: list[float] | None = Option(
-        None,
-        "--dt",
-        metavar="S",
-        help="Play this step size instead of those of the scene. Repeatable.",
+        None, metavar="S", help="Play this step size instead of those of the scene. Repeatable."
     ),
     full: bool = Option(False, "--full", help="Add two finer step sizes to every scene."),
     seed: Seed = 0,
-    out: Path = Option(
-        DEFAULT_OUT,
-        metavar="DIR",
-        help="Folder for the results. What was played there before is not played again.",
-    ),
+    out: Results = Path("reports/out/latest"),
     timings: float = Option(
         12.0,
         min=0,
@@ -166,11 +131,7 @@ def run(
 def report(
     out: Path = Argument(..., metavar="OUT", help="The folder of a run, finished or not."),
     timings: float | None = Option(
-        None,
-        min=0.1,
-        max=3600,
-        metavar="SECONDS",
-        help="Time the engines again, in so many seconds.",
+        None, min=0.1, max=3600, metavar="SECONDS", help="Time the engines again, in so many s."
     ),
 ) -> None:
     """Write the tables and the page of a run again.
@@ -193,17 +154,15 @@ def diff(
     Compares how the cells ended, their numbers, and how long they took. The exit status is 1 if
     anything got worse.
     """
-    from crosscheck2d.reports.commands import diff as diff_command
+    from crosscheck2d.reports.commands.diff import show_difference
 
-    diff_command.show_difference(before, after)
+    show_difference(before, after)
 
 
 @app.command()
 def truth(
     scene: OneScene,
-    events: bool = Option(
-        False, "--events", help="Print all collisions, not only the first and last ten."
-    ),
+    events: bool = Option(False, "--events", help="Print all collisions, not only twenty."),
     at: float | None = Option(
         None, metavar="SECONDS", help="Print where each disk is then, and how it moves."
     ),
@@ -293,10 +252,9 @@ def check(
     A solver.py runs in a sandbox where one works, which is said. It may import numpy, Python's own
     modules, and modules beside it that are not named like one of those.
     """
-    from crosscheck2d.reports.check.command import Asking, grading_of, outputs_of
-    from crosscheck2d.reports.check.command import check as check_and_say
+    from crosscheck2d.reports.check import command
 
-    grading = grading_of(points, id_pattern, hints)
+    grading = command.grading_of(points, id_pattern, hints)
     if scaffold:
         from crosscheck2d.reports.check.scaffold import write_scaffold
 
@@ -308,9 +266,9 @@ def check(
         folder = outs.pop()
     if fresh and folder is None:
         refuse("--fresh: is for the results of a class that --out FOLDER keeps")
-    outputs = outputs_of(as_json, junit, formats or [], outs or [])
-    asking = Asking(seed, packages or (), unprotected, folder, fresh)
-    check_and_say(path, page, outputs, grading, asking)
+    outputs = command.outputs_of(as_json, junit, formats or [], outs or [])
+    asking = command.Asking(seed, packages or (), unprotected, folder, fresh)
+    command.check(path, page, outputs, grading, asking)
 
 
 @app.command()
@@ -333,9 +291,7 @@ def play(
 
 @app.command()
 def lesson(
-    name: str = Argument(
-        "", metavar="NAME", help="A lesson, by name or number. Default: the list of them."
-    ),
+    name: str = Argument("", metavar="NAME", help="Its name or number. Default: the list."),
     port: Port = 8000,
     opens: Opens = False,
     export: Path | None = path_option(
@@ -365,9 +321,8 @@ def lesson(
 def speed(
     scenes: list[str] | None = Argument(
         None,
-        metavar="SCENARIO|FILE.toml",
-        help="Scenes: names of crosscheck list, or files. Default: one of each kind, or with"
-        " --full all.",
+        metavar=SCENE,
+        help="Names of crosscheck list, or files. Default: one of each kind, or with --full all.",
     ),
     engine: Engines = None,
     full: bool = Option(
@@ -455,12 +410,12 @@ def tune(
 
     Finds those that bring an engine nearest to the exact answers at equal cost.
     """
-    from crosscheck2d.reports.tune.command import tune as search_settings
+    from crosscheck2d.reports.tune import command
 
-    search_settings(engine or [], fresh, out)
+    command.tune(engine or [], fresh, out)
 
 
-@app.command(name="new-engine")
+@app.command()
 def new_engine(
     name: Path = path_argument(
         ..., metavar="NAME", help="The file to write: NAME.js in JavaScript, NAME.py in Python."
@@ -521,7 +476,7 @@ def new_engine(
     write_engine(name, hints)
 
 
-@app.command(name="new-solver")
+@app.command()
 def new_solver(
     name: Path = path_argument(
         ..., metavar="NAME", help="The file to write: Exercise.js or solver.py."
@@ -535,11 +490,11 @@ def new_solver(
 
 @app.command(name="list")
 def list_(
-    what: str = Argument(
+    kind: str = Argument(
         "", metavar="engines|scenarios|metrics|verdicts|cases|lessons", help="Default: all."
     ),
 ) -> None:
     """List engines, scenarios, metrics, verdicts, cases and lessons, and say what each is."""
     from crosscheck2d.reports.commands.listing import explain
 
-    explain(what)
+    explain(kind)

@@ -5,9 +5,8 @@ from __future__ import annotations
 
 import math
 import sys
-from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from collections import Counter, defaultdict
+from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
@@ -45,39 +44,19 @@ ROUNDINGS = 100
 ROUNDING = "differs in rounding"
 CELL = ["scenario", "name", "dt_s"]  # the name is `engine:profile`
 WHOSE = ["scenario", "engine", "profile", "dt_s", "versus"]  # in a table
+VALUES, NOTES = ({"before": name, "after": f"{name}_after"} for name in ("value", "note"))
 SHOWN = 12  # changes, the worst first
 MACHINE = ("system", "architecture", "processor", "cores")
-HEADINGS = (
-    "engine",
-    "status\nworse",
-    "status\nbetter",
-    "numbers\nthe same",
-    "in\nrounding",
-    "numbers\nworse",
-    "numbers\nbetter",
-    "numbers\nother",
-    "time\ntaken",
-)
-
-
-class Change(NamedTuple):
-    """A difference: the scene, the engine, what changed, its value before and after, and the
-    verdict "better", "worse", "other" or `ROUNDING`; of a number between two engines also the other
-    one."""
-
-    scenario: str
-    engine: str
-    what: str
-    before: str
-    after: str
-    verdict: str
-    factor: float = 1.0
-    beside: str = ""
-
-    @property
-    def text(self) -> str:
-        values = f"{self.before or 'nan'} → {self.after or 'nan'}"
-        return f"{self.verdict}: {self.engine}, {self.what}: {values}"
+HEADINGS = {  # of the printed table: what changed, and the verdict
+    "status\nworse": ("status", "worse"),
+    "status\nbetter": ("status", "better"),
+    "numbers\nthe same": ("number", "same"),
+    "in\nrounding": ("number", ROUNDING),
+    "numbers\nworse": ("number", "worse"),
+    "numbers\nbetter": ("number", "better"),
+    "numbers\nother": ("number", "other"),
+}
+TIME = "time\ntaken"
 
 
 class Timing(NamedTuple):
@@ -107,13 +86,15 @@ class Timing(NamedTuple):
         return f"×{self.factor:.2f} ({self.low:.2f}–{self.high:.2f}){verdict}"
 
 
-@dataclass(frozen=True)
-class Difference:
+class Difference(NamedTuple):
     """All differences between two runs.
 
     Attributes:
         warnings: reasons other than the engines why the two may differ.
-        statuses, numbers: what changed.
+        changes: a row for each: the `CELL`, and `beside` it the other engine of a number between
+            two, or ""; its `kind`, "status" or "number"; `what` changed, its value `before` and
+            `after`, and the larger value : the smaller as `factor`; the `verdict` "better",
+            "worse", "other" or `ROUNDING`.
         same: `engine:profile` -> number of values that are equal bit for bit; one between two
             engines counts for both.
         shared: the number of cells (scene, engine and step size) that both runs have.
@@ -121,16 +102,15 @@ class Difference:
     """
 
     warnings: list[str]
-    statuses: list[Change]
-    numbers: list[Change]
+    changes: pd.DataFrame
     same: Counter[str]
     shared: int
-    timings: Mapping[str, Timing]
+    timings: dict[str, Timing]
 
     @property
     def worse(self) -> int:
-        verdicts = [change.verdict for change in (*self.statuses, *self.numbers)]
-        return [*verdicts, *(each.verdict for each in self.timings.values())].count("worse")
+        times = [timing.verdict for timing in self.timings.values()]
+        return [*self.changes.verdict, *times].count("worse")
 
 
 def difference(before: Path, after: Path) -> Difference:
@@ -141,31 +121,20 @@ def difference(before: Path, after: Path) -> Difference:
     """
     with reading(before, COMMAND) as first, reading(after, COMMAND) as second:
         runs = RunResults.read(first), RunResults.read(second)
-        tables = table_of(runs[0]), table_of(runs[1])
-    cells = cells_of(runs[0]), cells_of(runs[1])
+        tables = read_table(runs[0]), read_table(runs[1])
+    cells = list_cells(runs[0]), list_cells(runs[1])
     both = cells[0].merge(cells[1], on=CELL, suffixes=("", "_after"))
-    hashes = [dict(zip(run.scenario, run.scene_hash)) for run in cells]
-    edited = sorted(
-        scene
-        for scene in hashes[0].keys() & hashes[1].keys()
-        if len({h[scene] for h in hashes}) > 1
-    )
+    edited = sorted({*both.scenario[both.scene_hash != both.scene_hash_after]})
     machines = [[run.header["machine"][key] for key in MACHINE] for run in runs]
     same_machine = machines[0] == machines[1]
     # of cells with the same key scene, settings and versions are the same
     equal = both[both.cell == both.cell_after] if same_machine else both[:0]
     played = both[(both.status == "ok") & (both.status_after == "ok")]
-    numbers, same = changed_numbers(*tables, names_of(equal))
-    statuses = changed_statuses(both) + changed_judgement(*tables, names_of(played))
-    numbers, statuses = (
-        [
-            change._replace(verdict="other")  # nothing in an edited scene is worse or better
-            if change.scenario in edited and change.verdict in ("worse", "better")
-            else change
-            for change in changes
-        ]
-        for changes in (numbers, statuses)
-    )
+    numbers, same = changed_numbers(*tables, equal)
+    statuses = pd.concat([changed_statuses(both), changed_judgement(*tables, played)])
+    changes = pd.concat([statuses.assign(beside="", factor=1.0), numbers])
+    judged = changes.verdict.isin(["worse", "better"])
+    changes.loc[judged & changes.scenario.isin(edited), "verdict"] = "other"
     busy = [run for run in runs if run.times and is_busy(run)]
     warnings = warnings_of(runs, cells, edited) + [
         f"{run.folder}: its times are not compared: two timings of the same engine"
@@ -173,10 +142,10 @@ def difference(before: Path, after: Path) -> Difference:
         for run in busy
     ]
     timings = timings_of(*runs, both) if same_machine and not busy else {}
-    return Difference(warnings, statuses, numbers, same, len(both), timings)
+    return Difference(warnings, changes, same, len(both), timings)
 
 
-def table_of(results: RunResults) -> pd.DataFrame:
+def read_table(results: RunResults) -> pd.DataFrame:
     """deviations.csv with all values as text: equal text means equal bits."""
     table = pd.read_csv(BytesIO(results.table()), dtype=str, keep_default_na=False)
     if list(table.columns) != list(COLUMNS):
@@ -187,15 +156,11 @@ def table_of(results: RunResults) -> pd.DataFrame:
     return table
 
 
-def cells_of(results: RunResults) -> pd.DataFrame:
+def list_cells(results: RunResults) -> pd.DataFrame:
     """The `CELL`, status, key and scene of each cell."""
     names = [encoded(f"{r['engine']}:{r['profile']}").decode() for r in results.records]
     columns = ["scenario", "dt_s", "status", "cell", "scene_hash"]
     return pd.DataFrame(results.records, columns=columns).assign(name=names)
-
-
-def names_of(cells: pd.DataFrame) -> set[tuple[str, str, float]]:
-    return set(cells[CELL].itertuples(index=False, name=None))
 
 
 def warnings_of(
@@ -217,10 +182,7 @@ def warnings_of(
     for run, own, other in zip(runs, cells, reversed(cells)):
         rest = own[~own.set_index(CELL).index.isin(other.set_index(CELL).index)]
         if len(rest):
-            engines, scenes = (
-                listed([*names[:6], *([f"{len(names) - 6} more"] if len(names) > 6 else [])])
-                for names in (list(rest.name.unique()), list(rest.scenario.unique()))
-            )
+            engines, scenes = map(some_of, ([*rest.name.unique()], [*rest.scenario.unique()]))
             warnings.append(
                 f"only in {run.folder}: {counted(len(rest), 'cell')} of {engines}, in {scenes}"
             )
@@ -232,109 +194,117 @@ def warnings_of(
     return warnings
 
 
-def changed_statuses(both: pd.DataFrame) -> list[Change]:
-    changes = []
-    for row in both[both.status != both.status_after].to_dict("records"):
-        was, now = row["status"], row["status_after"]
-        verdict = "worse" if was == "ok" else "better" if now == "ok" else "other"
-        what = f"{row['scenario']}  dt {row['dt_s']:.4g} s  status"
-        changes.append(Change(row["scenario"], row["name"], what, was, now, verdict))
-    return changes
+def some_of(names: Sequence[str]) -> str:
+    more = [f"{len(names) - 6} more"] if len(names) > 6 else []
+    return listed([*names[:6], *more])
+
+
+def changed_statuses(both: pd.DataFrame) -> pd.DataFrame:
+    rows = both[both.status != both.status_after]
+    verdict = np.select(
+        [rows.status == "ok", rows.status_after == "ok"], ["worse", "better"], "other"
+    )
+    values: dict[str, Any] = {"before": rows.status, "after": rows.status_after, "verdict": verdict}
+    return rows[CELL].assign(kind="status", what="status", **values)
 
 
 def changed_judgement(
-    before: pd.DataFrame, after: pd.DataFrame, played: Collection[tuple[str, str, float]]
-) -> list[Change]:
+    before: pd.DataFrame, after: pd.DataFrame, played: pd.DataFrame
+) -> pd.DataFrame:
     """The cells that both runs `played` but only one judged, so that only that one has numbers."""
     reasons = [table[table.metric == "status"][[*WHOSE, "note"]] for table in (before, after)]
     rows = reasons[0].merge(reasons[1], on=WHOSE, how="outer", suffixes=("", "_after"))
-    changes = []
-    for row in rows[rows.note.isna() != rows.note_after.isna()].to_dict("records"):
-        scenario, name, dt = (
-            row["scenario"],
-            f"{row['engine']}:{row['profile']}",
-            float(row["dt_s"]),
-        )
-        if (scenario, name, dt) in played:
-            what = f"{scenario}  dt {dt:.4g} s  against {row['versus']}: status"
-            was, now = (
-                "judged" if pd.isna(row[key]) else row[key] for key in ("note", "note_after")
-            )
-            verdict = "worse" if was == "judged" else "better"
-            changes.append(Change(scenario, name, what, was, now, verdict))
+    rows["name"] = rows.engine + ":" + rows.profile
+    rows = rows.loc[
+        (rows.note.isna() != rows.note_after.isna()) & are_in(played, rows, rows.name)
+    ].copy()
+    values = {name: rows[column].fillna("judged") for name, column in NOTES.items()}
+    verdict = np.where(rows.note.isna(), "worse", "better")
+    rows["what"] = "against " + rows.versus + ": status"
+    changes: pd.DataFrame = rows[[*CELL, "what"]].assign(kind="status", verdict=verdict, **values)
     return changes
 
 
+def are_in(cells: pd.DataFrame, rows: pd.DataFrame, names: pd.Series) -> Any:
+    """Whether each row of a table is of one of the `cells`, for the engine with its name."""
+    index = pd.MultiIndex.from_arrays([rows.scenario, names, rows.dt_s.astype(float)])
+    return index.isin(cells.set_index(CELL).index)
+
+
 def changed_numbers(
-    before: pd.DataFrame, after: pd.DataFrame, equal: Collection[tuple[str, str, float]]
-) -> tuple[list[Change], Counter[str]]:
+    before: pd.DataFrame, after: pd.DataFrame, equal: pd.DataFrame
+) -> tuple[pd.DataFrame, Counter[str]]:
     """Every number that differs between the tables, and how many are equal, by engine.
 
-    The numbers of `equal` cells must have the same bits: any change is worse.
+    The numbers of `equal` cells must have the same bits: any change is worse. Else the metric says
+    which value is better, unless they differ in rounding; a verdict that fails now, and did not
+    before, is worse. A deviation between two engines is "other".
     """
     both = before.merge(after, on=[*WHOSE, "metric"], suffixes=("", "_after"))
-    both["name"], differs = both.engine + ":" + both.profile, both.value != both.value_after
-    changes = []
-    for row in both[differs].to_dict("records"):
-        scenario, name, dt = row["scenario"], row["name"], float(row["dt_s"])
-        beside = row["versus"] if ":" in row["versus"] else ""
-        engines = [name, beside] if beside else [name]
-        what = f"{scenario}  dt {dt:.4g} s  {row['metric']} against {row['versus']}"
-        was, now = (row[key] or NOT_JUDGED for key in ("value", "value_after"))
-        if NOT_JUDGED in (was, now):
-            verdict, factor = "other", math.inf
-        else:
-            small, large = sorted(abs(float(value)) for value in (was, now))
-            factor = large / small if small > 0 and math.isfinite(large) else math.inf
-            verdict = verdict_of(row, engines)
-            if all((scenario, engine, dt) in equal for engine in engines):
-                verdict, what = "worse", f"{what} (same cell, other bits)"
-        changes.append(Change(scenario, name, what, was, now, verdict, factor, beside))
-    equal_rows = both[~differs]
-    between = equal_rows.versus.str.contains(":", regex=False)
-    return changes, Counter([*equal_rows.name, *equal_rows.versus[between]])
+    both["name"] = both.engine + ":" + both.profile
+    both["beside"] = both.versus.where(both.versus.str.contains(":", regex=False), "")
+    differs = both.value != both.value_after
+    same = Counter([*both.name[~differs], *both.beside[~differs & (both.beside != "")]])
+    rows = both[differs]
+    second = rows.beside.where(rows.beside != "", rows.name)
+    was, now, bound, bound_after = (
+        rows[column].replace("", "nan").astype(float)
+        for column in ("value", "value_after", "bound", "bound_after")
+    )
+    small, large = np.minimum(was.abs(), now.abs()), np.maximum(was.abs(), now.abs())
+    must_agree = are_in(equal, rows, rows.name) & are_in(equal, rows, second)
+    must_agree &= was.notna() & now.notna()
+    failed, fails = ~(was <= bound), ~(now <= bound_after)
+    better = rows.metric.map({name: metric.better for name, metric in METRICS.items()}).fillna("")
+    undirected = (rows.beside != "") | better.isin(["", "as stated"]) | (small == large)
+    verdict = np.select(
+        [
+            was.isna() | now.isna(),
+            must_agree,
+            is_rounding(rows.name, second, was, now),
+            rows.metric.isin([*VERDICTS]),
+            undirected,
+        ],
+        [
+            "other",
+            "worse",
+            ROUNDING,
+            np.where(failed == fails, "other", np.where(fails, "worse", "better")),
+            "other",
+        ],
+        np.where(np.where(better == "higher", now < was, now.abs() > was.abs()), "worse", "better"),
+    )
+    what = rows.metric + " against " + rows.versus
+    what += np.where(must_agree, " (same cell, other bits)", "")
+    values = {name: rows[column].replace("", NOT_JUDGED) for name, column in VALUES.items()}
+    with np.errstate(divide="ignore", invalid="ignore"):
+        factor = np.where((small > 0) & np.isfinite(large), large / small, np.inf)
+    about: dict[str, Any] = {"kind": "number", "what": what, "verdict": verdict, "factor": factor}
+    return rows[[*CELL, "beside"]].assign(**values, **about), same
 
 
-def verdict_of(row: Mapping[Any, Any], engines: Sequence[str]) -> str:
-    """The verdict on a number of these engines whose bits differ, unless they must not.
-
-    The metric says which value is better, unless they differ in rounding; a verdict that fails now,
-    and did not before, is worse. A deviation between two engines is "other".
-    """
-    was, now, metric = float(row["value"]), float(row["value_after"]), row["metric"]
-    if is_rounding(engines, was, now):
-        return ROUNDING
-    if metric in VERDICTS:
-        failed, fails = not was <= float(row["bound"]), not now <= float(row["bound_after"])
-        return "other" if failed == fails else "worse" if fails else "better"
-    better = METRICS[metric].better if metric in METRICS else ""
-    if len(engines) > 1 or better in ("", "as stated") or abs(now) == abs(was):
-        return "other"
-    return "worse" if (now < was if better == "higher" else abs(now) > abs(was)) else "better"
-
-
-def is_rounding(engines: Sequence[str], was: float, now: float) -> bool:
-    if not (math.isfinite(was) and math.isfinite(now)):
-        return False
-    bound = max(DIVERGED, *(ROUNDINGS * rounding_of(name) for name in engines))
-    return abs(now - was) <= bound * max(1.0, abs(was), abs(now))
+def is_rounding(name: pd.Series, second: pd.Series, was: pd.Series, now: pd.Series) -> Any:
+    """Whether two numbers of an engine, or of two, differ by no more than their rounding."""
+    rounding = np.maximum(name.map(rounding_of), second.map(rounding_of)).astype(float)
+    large = np.maximum(was.abs(), now.abs())
+    bound = np.maximum(DIVERGED, ROUNDINGS * rounding)
+    return np.isfinite(large) & ((now - was).abs() <= bound * np.maximum(large, 1.0))
 
 
 def timings_of(first: RunResults, second: RunResults, both: pd.DataFrame) -> dict[str, Timing]:
-    ratios: dict[str, list[float]] = {}
-    least: dict[str, list[float]] = {}
-    for row in both[both.scene_hash == both.scene_hash_after].to_dict("records"):
-        was, now = first.times.get(row["cell"]), second.times.get(row["cell_after"])
+    ratios, least = defaultdict[str, list[float]](list), defaultdict[str, list[float]](list)
+    rows = both[both.scene_hash == both.scene_hash_after]
+    for name, key, key_after in zip(rows.name, rows.cell, rows.cell_after):
+        was, now = first.times.get(key), second.times.get(key_after)
         if was is None or now is None or was["timed_s"] != now["timed_s"]:
             continue
-        rounds = [*zip(was["cost"], now["cost"])]
-        if rounds and min(min(rounds)) > 0:
-            fastest, then = (min(times) for times in zip(*rounds))
-            least.setdefault(row["name"], []).append(then / fastest)
-            ratios.setdefault(row["name"], []).extend(now / was for was, now in rounds)
+        costs = np.array([*zip(was["cost"], now["cost"])])
+        if costs.size and costs.min() > 0:
+            fastest, then = costs.min(axis=0)
+            least[name].append(then / fastest)
+            ratios[name] += [*(costs[:, 1] / costs[:, 0])]
     return {
-        engine: timing(sorted(ratios[engine]), float(np.median(least[engine])))
-        for engine in sorted(ratios)
+        name: timing(sorted(ratios[name]), float(np.median(least[name]))) for name in sorted(ratios)
     }
 
 
@@ -369,14 +339,17 @@ def show_difference(before: Path, after: Path) -> NoReturn:
     for warning in changed.warnings:
         console.print(warning, style="yellow", highlight=False)
     title = "What changed; a number between two engines counts for both"
-    print_table(console, HEADINGS, by_engine(changed), title, left=HEADINGS[-1:])
+    print_table(console, ["engine", *HEADINGS, TIME], by_engine(changed), title, left=[TIME])
     console.print()
-    changes = [*changed.statuses, *changed.numbers]
-    if worst := sorted(changes, key=severity)[:SHOWN]:
+    if len(changes := changed.changes):
+        # worse changes first, rounding last, then statuses first, then by size
+        verdict, numbers = changes.verdict, changes.kind == "number"
+        order = np.lexsort((-changes.factor, numbers, verdict == ROUNDING, verdict != "worse"))
+        worst = changes.iloc[order[:SHOWN]]
         some = len(changes) > SHOWN
-        title = f"The {len(worst)} largest of {len(changes)} changes" if some else "The changes"
+        title = f"The {SHOWN} largest of {len(changes)} changes" if some else "The changes"
         console.print(f"{title}, before → after", style="italic", highlight=False)
-        print_list(console, [change.text for change in worst])
+        print_list(console, map(sentence_on, worst.itertuples()))
         console.print()
     worse = f"{counted(changed.worse, 'result') if changed.worse else 'Nothing'} got worse."
     times = "No times were compared: run both on one machine that is idle."
@@ -389,28 +362,21 @@ def show_difference(before: Path, after: Path) -> NoReturn:
     sys.exit(FAILED if changed.worse else DONE)
 
 
+def sentence_on(change: Any) -> str:
+    what = f"{change.scenario}  dt {float(change.dt_s):.4g} s  {change.what}"
+    return f"{change.verdict}: {change.name}, {what}: {change.before} → {change.after}"
+
+
 def by_engine(changed: Difference) -> list[list[str]]:
-    kinds = [(changed.statuses, ["worse", "better"])]
-    kinds.append((changed.numbers, [ROUNDING, "worse", "better", "other"]))
-    changes = [change for kind, _ in kinds for change in kind]
-    engines = [*changed.same, *(change.engine for change in changes)]
-    engines += [change.beside for change in changes if change.beside]
-    rows = []
-    for engine in dict.fromkeys((*engines, *changed.timings)):
-        texts = []
-        for kind, verdicts in kinds:
-            counts = Counter(x.verdict for x in kind if engine in (x.engine, x.beside))
-            texts += [str(counts[verdict] or "") for verdict in verdicts]
-        time = changed.timings[engine].text if engine in changed.timings else ""
-        rows.append([engine, *texts[:2], str(changed.same[engine]), *texts[2:], time])
-    return rows
-
-
-def severity(change: Change) -> tuple[bool, bool, bool, float]:
-    # worse changes first, rounding last, then statuses first, then by size
-    return (
-        change.verdict != "worse",
-        change.verdict == ROUNDING,
-        not change.what.endswith("status"),
-        -change.factor,
-    )
+    between = changed.changes[changed.changes.beside != ""]
+    changes = pd.concat([changed.changes, between.assign(name=between.beside)])
+    counts = changes.value_counts(["name", "kind", "verdict"]).to_dict()
+    counts |= {(name, "number", "same"): count for name, count in changed.same.items()}
+    return [
+        [
+            name,
+            *(str(counts.get((name, *what), "")) for what in HEADINGS.values()),
+            changed.timings[name].text if name in changed.timings else "",
+        ]
+        for name in dict.fromkeys([*changed.same, *changes.name, *changed.timings])
+    ]

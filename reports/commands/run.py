@@ -6,12 +6,13 @@ from __future__ import annotations
 import os
 import shlex
 import sys
-from collections.abc import Sequence, Set
+from collections.abc import Iterable, Sequence, Set
 from contextlib import chdir, nullcontext
 from pathlib import Path
 from typing import NamedTuple, NoReturn
 
 import numpy as np
+import pandas as pd
 import psutil
 
 from crosscheck2d.adapters.advance import off_grid_note
@@ -193,7 +194,7 @@ def finish(report: Report, status: int = DONE) -> NoReturn:
 def print_summary(report: Report) -> None:
     """Print the medians over the scenarios at their middle step, the findings, and the path of the
     page."""
-    console, scenes = Console(), report.summary.scenes
+    console, scenes, results = Console(), report.summary.scenes, report.results
     names, untrusted = report.summary.names, report.summary.untrusted
     for rough in (False, True):
         some = [s for s in scenes if bool(s.comparison.scenario.scene.friction) == rough]
@@ -218,29 +219,20 @@ def print_summary(report: Report) -> None:
         for scene in scenes
         if (note := off_grid_note(scene.comparison.scenario))
     ]
-    print_list(console, [*report.findings, *checks, *notes, statuses(report)])
-    page = (report.results.folder / PAGE).resolve()
-    for line in filter(None, (failures(report, page.parent), times(report))):
-        console.print(line, highlight=False, soft_wrap=True)
-    console.print(f"\n{page}", style="bold", highlight=False, soft_wrap=True)
-
-
-def statuses(report: Report) -> str:
     counts = report.runs.status.value_counts()
-    said = ", ".join(f"{counts[status]} {status}" for status in STATUSES if status in counts)
-    ended = counted(len(report.runs), "cell")
-    if report.results.complete:
-        return f"{ended} ended: {said}."
-    return f"Not finished: {ended} ended so far: {said}."
-
-
-def times(report: Report) -> str:
-    taken, again = report.results.timing.get("taken", ""), take_times(report.results.folder)
-    if not taken:
-        return f"No times were taken. To take them: {again}"
-    if taken >= report.results.header["started"]:
-        return ""
-    return f"The times are of {taken}. To take them again: {again}"
+    statuses = ", ".join(f"{counts[status]} {status}" for status in STATUSES if status in counts)
+    ended = f"{counted(len(report.runs), 'cell')} ended"
+    ended = f"{ended}: " if results.complete else f"Not finished: {ended} so far: "
+    print_list(console, [*report.findings, *checks, *notes, f"{ended}{statuses}."])
+    page = (results.folder / PAGE).resolve()
+    taken, again = results.timing.get("taken", ""), take_times(results.folder)
+    times = f"No times were taken. To take them: {again}"
+    if taken:
+        times = f"The times are of {taken}. To take them again: {again}"
+    for line in (failures(report, page.parent), times if taken < results.header["started"] else ""):
+        if line:
+            console.print(line, highlight=False, soft_wrap=True)
+    console.print(f"\n{page}", style="bold", highlight=False, soft_wrap=True)
 
 
 def failures(report: Report, out: Path) -> str:
@@ -269,56 +261,49 @@ def medians(
     """
     without = [name for name in names if all(name in s.frictionless for s in scenes)]
     names = [name for name in names if name not in without]
-    pools = {(name, column): pool(scenes, name, column) for name in names for column in COLUMNS}
-    columns = [column for column in COLUMNS if any(pools[name, column] for name in names)]
+    scores = {
+        column: pd.DataFrame([[score(s, name, column) for s in scenes] for name in names], names)
+        for column in COLUMNS
+    }
+    scores = {column: frame for column, frame in scores.items() if frame.notna().any(axis=None)}
     rows = []
     for name in names:
-        asked = [s for s in scenes if not (name.endswith(OWN) and name in s.refused)]
-        refused = sum(name in scene.refused for scene in asked)
+        own, refused = name.endswith(OWN), sum(name in scene.refused for scene in scenes)
         fails = sum(bool(scene.verdicts(name)) for scene in scenes)
-        played = sum(name not in scene.refused for scene in scenes)
-        failure = "fails" if fails else "not played"
-        cells = [median_text(pools[name, column], failure) for column in columns]
+        played = len(scenes) - refused
+        texts = {np.inf: "fails" if fails else "not played"}
+        middle = [frame.median(axis=1)[name] for frame in scores.values()]
+        cells = ["–" if np.isnan(value) else texts.get(value, number(value)) for value in middle]
         cells.append(f"{fails} of {played}" if played else "–")
         if name in untrusted:
             cells = ["breaks"] * len(cells)
-        cells.append(f"{refused} of {len(asked)}" if asked else "not asked")
+        refusals = f"0 of {played}" if own else f"{refused} of {len(scenes)}"
+        cells.append(refusals if played or not own else "not asked")
         rows.append([name, *cells])
     if rows and len(scenes) > 1:
-        counts = [[len(pools[name, column]) for name in names] for column in columns]
-        rows.append(["in scenes", *map(numbers_of_scenes, counts), "", ""])
-    return ["engine", *map(heading, [*columns, *COUNTED])], rows, without
+        counts = [numbers_of_scenes(frame.count(axis=1)) for frame in scores.values()]
+        rows.append(["in scenes", *counts, "", ""])
+    return ["engine", *map(heading, [*scores, *COUNTED])], rows, without
 
 
-def pool(scenes: Sequence[SceneScores], name: str, column: Column) -> list[float]:
-    """The value in each scene in which it is judged; wrong collisions are the missed and the
-    spurious ones together, without collisions in the exact answer the spurious ones."""
-    pooled = []
-    for scene in scenes:
-        found = values(scene.comparison)
-        own = [found[name, metric] for metric in column.metrics if (name, metric) in found]
-        judged = [value.value for value in own if value.judged]
-        applies = any(metric in column.metrics and v.judged for (_, metric), v in found.items())
-        refused = name in scene.refused and not name.endswith(OWN)
-        lost = bool(scene.verdicts(name)) or refused
-        if lost and (applies or (column.metrics == (MAPPED,) and bool(scene.verdicts(name)))):
-            pooled.append(np.inf)
-        elif judged:
-            pooled.append(float(sum(judged)))
-    return pooled
+def score(scene: SceneScores, name: str, column: Column) -> float:
+    """The value of an engine in a scene, inf if it is lost there, nan where it is not judged. Wrong
+    collisions are the missed and the spurious ones together, without collisions in the exact answer
+    the spurious ones."""
+    judged = {key: v.value for key, v in values(scene.comparison).items() if v.judged}
+    own = [judged[name, metric] for metric in column.metrics if (name, metric) in judged]
+    applies = any(metric in column.metrics for _, metric in judged)
+    fails = bool(scene.verdicts(name))
+    lost = fails or (name in scene.refused and not name.endswith(OWN))
+    if lost and (applies or (column.metrics == (MAPPED,) and fails)):
+        return np.inf
+    return float(sum(own)) if own else np.nan
 
 
-def median_text(pooled: Sequence[float], failure: str) -> str:
-    if not pooled:
-        return "–"
-    median = float(np.median(pooled))
-    return failure if np.isinf(median) else number(median)
-
-
-def numbers_of_scenes(counts: Sequence[int]) -> str:
+def numbers_of_scenes(counts: Iterable[int]) -> str:
     """Of how many scenes the medians of a column are: "9", "5–8", or "" if there is none."""
-    counts = sorted({count for count in counts if count})
-    return "–".join(map(str, dict.fromkeys((*counts[:1], *counts[-1:]))))
+    least = [count for count in counts if count]
+    return "–".join(map(str, dict.fromkeys((min(least), max(least))))) if least else ""
 
 
 def heading(column: Column) -> str:

@@ -77,7 +77,7 @@ def make_report(results: RunResults, say: Callable[[str], None]) -> Report:
     header = results.header
     tables = make_tables(results, say)
     say("writing the page")
-    comparisons = comparisons_of(results, tables)
+    comparisons = [*comparisons_of(results, tables)]
     # an interrupt may come first
     began = {run.name for comparison in comparisons for run in comparison.runs}
     engines = [name for name in header["engines"] if name in began and name in results.conformance]

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
-from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -24,12 +23,10 @@ from crosscheck2d.reports.terminal.exits import Unusable
 from crosscheck2d.reports.terminal.foreign_text import encoded
 from crosscheck2d.scenarios.no_truth import answered
 
-
-class ComparedScene(NamedTuple):
-    """The exact answer to a scene; its part of deviations.csv, or why it could not be made."""
-
-    answer: comparing.ExactAnswer
-    table: bytes | Failure
+RUNS = [
+    *("scenario", "engine", "profile", "dt_s", "seed", "status", "reason", "step", "until_s"),
+    *("seconds", "cell", "settings", "versions"),
+]
 
 
 class Tables(NamedTuple):
@@ -38,14 +35,16 @@ class Tables(NamedTuple):
     Attributes:
         runs: runs.csv.
         timed: timings.csv.
-        scenes: scene -> how it was compared.
+        answers, parts: scene of which any cell has ended -> its exact answer, its part of
+            deviations.csv.
         unjudged: name of a scene -> why it is not compared with its answer, or not at all, though
             it should be.
     """
 
     runs: pd.DataFrame
     timed: pd.DataFrame
-    scenes: Mapping[str, ComparedScene]
+    answers: dict[str, comparing.ExactAnswer]
+    parts: dict[str, bytes]
     unjudged: dict[str, str]
 
 
@@ -63,78 +62,85 @@ def make_tables(results: RunResults, say: Callable[[str], None]) -> Tables:
                 f"{source.name} has changed since it was played; crosscheck run --out"
                 f" {results.folder} plays it again"
             )
-    scenes = compare_scenes(results, say)
+    compared = compare_scenes(results, say)
     say("writing the tables")
-    store, parts, unjudged = results.store, list[bytes](), dict[str, str]()
-    for scene, (answer, table) in scenes.items():
-        name = results.sources[scene].name
-        if answer.lost:
-            unjudged[name] = answer.lost
+    store, parts, unjudged = results.store, dict[str, bytes](), dict[str, str]()
+    answers = {scene: answer for scene, (answer, _) in compared.items()}
+    for scene, (answer, table) in compared.items():
+        reason = answer.lost
         if isinstance(table, Failure):
-            unjudged[name] = not_compared(table)
-            parts.append(comparing.csv_of(not_judged(results, scene, table).table))
-        else:
-            parts.append(table)
-    table = joined(parts)
-    store.put("run", "table", None, table)
-    store.export("deviations.csv", table)
-    runs = table_of_runs(results.records)
-    store.export("runs.csv", runs.to_csv(index=False))
+            reason = not_compared(table)
+            answers[scene] = comparing.ExactAnswer(None, table.status, reason)
+            runs = [results.run(record, False) for record in results.by_scene[scene]]
+            table = comparing.csv_of(comparing.rows_not_judged(runs, reason, ITSELF))
+        parts[scene] = table
+        if reason:
+            unjudged[results.sources[scene].name] = reason
+    rows = [part.partition(b"\n")[2] if k else part for k, part in enumerate(parts.values())]
+    whole = encoded(b"".join(rows).decode(errors=comparing.PATHS))
+    store.put("run", "table", None, whole)
+    store.export("deviations.csv", whole)
+    played = table_of_runs(results.records)
+    store.export("runs.csv", played.to_csv(index=False))
     timed = timings(results)
     store.export(TABLE, timed.to_csv(index=False, float_format="%.6g"))
     names = set()
     for record in results.records if results.header["trajectories"] else ():
-        row = store.get("cell", record["cell"])
-        if row is not None and row.blob:
+        if file := comparing.file_of(store, record):
             names.add(name := f"trajectories/{record['cell']}.npz")
-            store.export(name, row.blob)
+            store.export(name, file)
     store.delete_exports("trajectories", names)  # those of other plans
-    return Tables(runs, timed, scenes, unjudged)
+    return Tables(played, timed, answers, parts, unjudged)
 
 
-def joined(parts: Sequence[bytes]) -> bytes:
-    """Scene tables as one table, whose header stands only once."""
-    rows = [part.partition(b"\n")[2] if number else part for number, part in enumerate(parts)]
-    return encoded(b"".join(rows).decode(errors=comparing.PATHS))
+def comparisons_of(results: RunResults, tables: Tables) -> Iterator[Comparison]:
+    """The comparisons in reading order. Only runs at the middle dt have their trajectories, because
+    no others are drawn."""
+    for scene, answer in tables.answers.items():
+        scenario, truth = answered(answer.put_into(results.sources[scene].scenario()))
+        middle = scenario.middle_substeps
+        runs = [
+            results.run(record, record["substeps"] == middle) for record in results.by_scene[scene]
+        ]
+        yield Comparison(scenario, truth, runs, comparing.read_scene_table(tables.parts[scene]))
 
 
-def compare_scenes(results: RunResults, say: Callable[[str], None]) -> dict[str, ComparedScene]:
-    """Scene -> how it was compared, of those of which any cell has ended. Answers and comparisons
-    that have no row are made in worker processes."""
-    store, sources, cores = results.store, results.sources, os.cpu_count() or 1
+def compare_scenes(
+    results: RunResults, say: Callable[[str], None]
+) -> dict[str, tuple[comparing.ExactAnswer, bytes | Failure]]:
+    """Scene -> its exact answer, and its part of deviations.csv, or why that could not be made.
+    Answers and comparisons that have no row are made in worker processes."""
+    store, sources = results.store, results.sources
     # As much time as the cells had: it is the same option.
     timeout = max(record["timeout_s"] for record in results.records)
-    answers: dict[Any, Callable[[], comparing.ExactAnswer]] = {}
-    for scene in results.by_scene:
-        row = store.get(ANSWER, comparing.answer_key(sources[scene]))
-        if row is None or not is_usable(row, timeout):
-            answers[scene] = partial(comparing.compute_answer, sources[scene])
-    with closing(run_all(answers, cores, timeout)) as ended:
-        for scene, result in ended:
-            say(f"answered: {sources[scene].name}")
-            key, values = (
-                comparing.answer_key(sources[scene]),
-                comparing.answer_row(result, timeout),
-            )
-            store.put(ANSWER, key, *values)
+
+    def carry_out(tasks: dict[Any, Any], what: str) -> Iterator[tuple[str, Any]]:
+        with closing(run_all(tasks, os.cpu_count() or 1, timeout)) as ended:
+            for scene, result in ended:
+                say(f"{what}: {sources[scene].name}")
+                yield scene, result
+
+    keys = {scene: comparing.answer_key(sources[scene]) for scene in results.by_scene}
+    rows = {scene: store.get(ANSWER, key) for scene, key in keys.items()}
+    missing = {
+        scene: partial(comparing.compute_answer, sources[scene])
+        for scene, row in rows.items()
+        if row is None or not is_usable(row, timeout)
+    }
+    for scene, result in carry_out(missing, "answered"):
+        store.put(ANSWER, keys[scene], *comparing.answer_row(result, timeout))
     tasks = {
         scene: comparing.compare_task(store, sources[scene], records)
         for scene, records in results.by_scene.items()
     }
-    tables: dict[str, bytes | Failure] = {}
-    missing: dict[Any, comparing.CompareTask] = {}
-    for scene, (key, task) in tasks.items():
-        if row := store.get(COMPARED, key):
-            tables[scene] = row.blob
-        else:
-            missing[scene] = task
-    with closing(run_all(missing, cores, timeout)) as ended:
-        for scene, result in ended:
-            say(f"compared: {sources[scene].name}")
-            tables[scene] = result
-            if not isinstance(result, Failure):
-                store.put(COMPARED, tasks[scene][0], None, result)
-    return {scene: ComparedScene(task.answer, tables[scene]) for scene, (_, task) in tasks.items()}
+    rows = {scene: store.get(COMPARED, key) for scene, (key, _) in tasks.items()}
+    tables: dict[str, bytes | Failure] = {scene: row.blob for scene, row in rows.items() if row}
+    lacking = {scene: task for scene, (_, task) in tasks.items() if scene not in tables}
+    for scene, result in carry_out(lacking, "compared"):
+        tables[scene] = result
+        if not isinstance(result, Failure):
+            store.put(COMPARED, tasks[scene][0], None, result)
+    return {scene: (task.answer, tables[scene]) for scene, (_, task) in tasks.items()}
 
 
 def not_compared(failure: Failure) -> str:
@@ -143,45 +149,15 @@ def not_compared(failure: Failure) -> str:
     return f"the comparison could not be made: {failure.status}: {failure.reason}"
 
 
-def not_judged(results: RunResults, scene: str, failure: Failure) -> Comparison:
-    """What can be shown of a scene whose comparison failed: its runs, with no answer."""
-    runs = [results.run(record) for record in results.by_scene[scene]]
-    why = not_compared(failure)
-    scenario = replace(results.sources[scene].scenario(), truth=None, without_truth=why)
-    return Comparison(scenario, None, runs, comparing.rows_not_judged(runs, why, ITSELF))
-
-
-def comparisons_of(results: RunResults, tables: Tables) -> list[Comparison]:
-    """The comparisons in reading order. Only runs at the middle dt have their trajectories, because
-    no others are drawn."""
-    comparisons = []
-    for scene, records in results.by_scene.items():
-        answer, compared = tables.scenes[scene]
-        if isinstance(compared, Failure):
-            comparisons.append(not_judged(results, scene, compared))
-            continue
-        scenario = answer.put_into(results.sources[scene].scenario())
-        scenario, truth = answered(scenario)
-        middle = scenario.middle_substeps
-        runs = [results.run(record, record["substeps"] == middle) for record in records]
-        table = comparing.read_scene_table(compared)
-        comparisons.append(Comparison(scenario, truth, runs, table))
-    return comparisons
-
-
 def table_of_runs(records: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
     """A row for each cell: what was played, status, engine time, settings and versions."""
-    columns = [
-        *("scenario", "engine", "profile", "dt_s", "seed", "status", "reason", "step", "until_s"),
-        *("seconds", "cell"),
-    ]
-    rows = []
-    for record in records:
-        settings = [
+    runs = pd.DataFrame(records, columns=RUNS)
+    runs["settings"] = [
+        "; ".join(
             f"{name}: asked {'default' if asked is None else asked}, used {used}"
-            for name, (asked, used) in record["settings"].items()
-        ]
-        versions = [f"{name} {version}" for name, version in record["versions"].items()]
-        row = {name: record[name] for name in columns}
-        rows.append(row | {"settings": "; ".join(settings), "versions": "; ".join(versions)})
-    return pd.DataFrame(rows, columns=[*columns, "settings", "versions"])
+            for name, (asked, used) in settings.items()
+        )
+        for settings in runs.settings
+    ]
+    runs["versions"] = ["; ".join(map(" ".join, versions.items())) for versions in runs.versions]
+    return runs

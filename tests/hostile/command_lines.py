@@ -108,7 +108,7 @@ REFUSED: dict[str, tuple[str | tuple[str, ...], str]] = {
 PLAYED = "run two.toml --engine pymunk:shipped --dt 0.02 --out out"
 DONE: dict[str, tuple[str, tuple[int, ...], str]] = {
     "a thousand workers": (f"{PLAYED} --workers 1000", (0,), "1 cell ended: 1 ok"),
-    "workers of 18 digits": (f"{PLAYED} --workers {'9' * 18}", (0, 2), ""),
+    "workers of 18 digits": (f"{PLAYED} --workers {'9' * 18}", (0,), ""),
     "more memory than there is": (f"{PLAYED} --workers 1 --memory 1000000000", (0,), "1 ok"),
     "a scene twice": (
         f"run two.toml {PLAYED.removeprefix('run ')} --workers 1",
@@ -123,7 +123,7 @@ DONE: dict[str, tuple[str, tuple[int, ...], str]] = {
         "1 cell ended",
     ),
     "a seed of 18 digits": (("truth", "two.toml", "--seed", "9" * 18), (0,), "horizon"),
-    "a tenth of a second": ("truth two.toml --timeout 0.1", (0, 1), ""),
+    "a tenth of a second": ("truth two.toml --timeout 0.1", (0,), ""),
     "no words at all but help": ("--help", (0,), "Commands"),
     "help after nonsense": ("run nonsense --help", (0,), "Options"),
     "a list of everything": ("list", (0,), "free_fall"),

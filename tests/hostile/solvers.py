@@ -176,7 +176,7 @@ CALLED: dict[str, tuple[str, str, str]] = {
 }
 WRITES = ("check.html", "out", "out.part")
 right = partial(Input, codes=(0,), writes=WRITES)
-either = partial(Input, codes=(0, 1))
+harmless = partial(Input, codes=(0,))
 CHECKED = tuple(
     Input(
         f"check: {what}",
@@ -195,12 +195,7 @@ CHECKED = tuple(
         {name: text},
         says=says,
         writes=WRITES,
-        codes=(
-            (0, 1)
-            if what.endswith("printed")
-            or what in ("warnings", "threads without end", "a process that goes on")
-            else (1,)
-        ),
+        codes=(0,) if what.endswith("printed") or what == "warnings" else (1,),
     )
     for what, (name, text, says) in CALLED.items()
 )
@@ -227,7 +222,7 @@ ENGINES = (
             f"{PLAYED} {name}",
             {"two.toml": TWO, name: f"{text}\n{PY}" if what in LOADING else text},
             writes=WRITES,
-            codes=(0, 1) if what.endswith("printed") else (1,),
+            codes=(0,) if what.endswith("printed") else (1,),
         )
         for what in IN_A_RUN
         for name, text, _ in [(LOADING | CALLED)[what]]
@@ -245,28 +240,28 @@ ENGINES = (
 DELETES = within("import os", "if os.path.exists(__file__): os.remove(__file__)")
 WRITING = f"open('made_by_me.txt', 'w').write('x')\n{PY}"
 OWN_DOING = (
-    either(
+    harmless(
         "check: deletes itself", "check mine.py", {"mine.py": DELETES}, writes=(*WRITES, "mine.py")
     ),
-    either(
+    harmless(
         "run: deletes itself",
         f"{PLAYED} mine.py",
         {"two.toml": TWO, "mine.py": DELETES},
         writes=(*WRITES, "mine.py"),
     ),
-    either(
+    harmless(
         "check: writes into where one is",
         "check mine.py",
         {"mine.py": WRITING},
         writes=(*WRITES, "made_by_me.txt"),
     ),
-    either(
+    harmless(
         "run: writes over itself",
         f"{PLAYED} mine.py",
         {"two.toml": TWO, "mine.py": within("open(__file__, 'w').write('nonsense(')")},
         writes=(*WRITES, "mine.py"),
     ),
-    either(
+    harmless(
         "run: leaves where one is",
         f"{PLAYED} mine.py",
         {"two.toml": TWO, "mine.py": within("import os; os.chdir('/')")},
@@ -370,7 +365,7 @@ NAMES = (
         "check: a class of which nobody has a solver",
         "check .",
         {"a/mine.py": "x = (\n", "b/mine.js": "x = ;\n", "c/read.me": "later", "d/mine.py": ""},
-        codes=(1, 2),
+        codes=(1,),
         writes=WRITES,
     ),
 )

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from crosscheck2d.adapters.run import Run
-from crosscheck2d.reports.commands.diff import changed_numbers
+from crosscheck2d.reports.commands.diff import CELL, changed_numbers
 from crosscheck2d.reports.commands.run import medians
 from crosscheck2d.reports.compare.collisions import WINDOW
 from crosscheck2d.reports.compare.comparison import Comparison, compare
@@ -165,14 +165,15 @@ def test_a_number_that_is_judged_in_one_run_only_is_neither_worse_nor_better(tmp
         each.table.to_csv(tmp_path / "share.csv", index=False)
         read_scene_table((tmp_path / "share.csv").read_bytes())
         tables.append(pd.read_csv(tmp_path / "share.csv", dtype=str, keep_default_na=False))
-    changes, _ = changed_numbers(*tables, set())
-    back, _ = changed_numbers(*tables[::-1], set())
+    none = pd.DataFrame(columns=CELL)
+    changes, _ = changed_numbers(*tables, none)
+    back, _ = changed_numbers(*tables[::-1], none)
     tables[1].loc[tables[1].note.str.startswith(NOT_JUDGED), ["value", "note"]] = "1e9", ""
-    control, _ = changed_numbers(*tables, set())
+    control, _ = changed_numbers(*tables, none)
 
-    assert {change.verdict for change in (*changes, *back)} == {"other"}
-    assert {change.after for change in changes} == {NOT_JUDGED}
-    assert "worse" in {change.verdict for change in control}
+    assert {*changes.verdict, *back.verdict} == {"other"}
+    assert {*changes.after} == {NOT_JUDGED}
+    assert "worse" in {*control.verdict}
 
 
 def test_a_velocity_that_overflows_is_judged_and_bad():

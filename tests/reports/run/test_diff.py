@@ -5,7 +5,6 @@ import math
 import random
 import shutil
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from statistics import median
 
@@ -15,7 +14,7 @@ import pytest
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.reports.commands.diff import (
     ROUNDING,
-    Change,
+    Difference,
     Timing,
     difference,
     is_rounding,
@@ -96,6 +95,11 @@ def elsewhere(plan: dict) -> None:
     plan["machine"].update(processor="abacus")
 
 
+def verdicts_where(changed: Difference, column: str, text: str) -> set[str]:
+    changes = changed.changes
+    return set(changes.verdict[changes[column].str.contains(text)])
+
+
 def exit_of(before: Path, after: Path) -> object:
     with pytest.raises(SystemExit) as left:
         show_difference(before, after)
@@ -116,8 +120,7 @@ def test_the_numbers_do_not_depend_on_workers_or_order(
     monkeypatch.setattr(suite, "run_all", shuffled)
     again = run(tmp_path / "again", workers=1)
     assert (again / "deviations.csv").read_bytes() == (before / "deviations.csv").read_bytes()
-    changed = difference(before, again)
-    assert (changed.numbers, changed.statuses) == ([], [])
+    assert difference(before, again).changes.empty
 
 
 def test_the_same_run_has_not_changed(
@@ -137,7 +140,7 @@ def test_a_number_between_two_engines_counts_for_both(before: Path, after: Path)
 def test_runs_without_a_common_cell_are_not_said_to_have_got_worse(
     before: Path, after: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ):
-    nothing = replace(difference(before, after), shared=0)
+    nothing = difference(before, after)._replace(shared=0)
     monkeypatch.setattr("crosscheck2d.reports.commands.diff.difference", lambda *_: nothing)
 
     with pytest.raises(SystemExit) as end:
@@ -153,7 +156,7 @@ def test_one_bit_in_a_cell_that_is_the_same_is_worse(before: Path, after: Path):
     row = table.index[(table.metric == "position_max") & (table.versus == "truth")][0]
     table.loc[row, "value"] = repr(float(table.loc[row, "value"]) * (1 - 2**-53))
     put_table(table, after)
-    [change] = difference(before, after).numbers
+    [change] = difference(before, after).changes.itertuples()
 
     assert (change.verdict, "same cell, other bits" in change.what) == ("worse", True)
     assert exit_of(before, after) == 1
@@ -171,8 +174,8 @@ def test_where_versions_differ_the_metric_says_what_is_worse(
     changed = difference(before, after)
 
     assert "differs in version: pymunk: 7.3.1 before, 8.0 after" in changed.warnings
-    assert {one.verdict for one in changed.numbers if "against truth" in one.what} == {verdict}
-    assert {one.verdict for one in changed.numbers if "against pymunk" in one.what} <= {"other"}
+    assert verdicts_where(changed, "what", "against truth") == {verdict}
+    assert verdicts_where(changed, "what", "against pymunk") <= {"other"}
 
 
 def test_a_verdict_that_fails_now_is_worse_and_one_that_passes_still_is_neither(
@@ -186,15 +189,11 @@ def test_a_verdict_that_fails_now_is_worse_and_one_that_passes_still_is_neither(
     table.loc[overlap, "value"] = 0.5 * table.loc[overlap, "bound"]
     put_table(table, after)
 
-    def verdicts(changes: list[Change]) -> set[tuple[str, str]]:
-        return {(one.what.split("  ")[-1], one.verdict) for one in changes}
-
-    same = ("overlap against itself", "other")
-    assert verdicts(difference(before, after).numbers) == {
-        ("tunnelled against itself", "worse"),
-        same,
-    }
-    assert ("tunnelled against itself", "better") in verdicts(difference(after, before).numbers)
+    now, back = difference(before, after), difference(after, before)
+    assert set(now.changes.what) == {"tunnelled against itself", "overlap against itself"}
+    assert verdicts_where(now, "what", "tunnelled") == {"worse"}
+    assert verdicts_where(now, "what", "overlap") == {"other"}
+    assert verdicts_where(back, "what", "tunnelled") == {"better"}
 
 
 @pytest.mark.parametrize(
@@ -212,9 +211,8 @@ def test_a_difference_within_rounding_is_neither_worse_nor_better(
     rows = (table.metric == "position_max") & (table.versus == "truth")
     table.loc[rows, "value"] += moved
     put_table(table, after)
-    changed = difference(before, after)
 
-    assert [one.verdict for one in changed.numbers] == [verdict] * int(rows.sum())
+    assert list(difference(before, after).changes.verdict) == [verdict] * int(rows.sum())
     assert exit_of(before, after) == int(verdict == "worse")
 
 
@@ -234,8 +232,10 @@ def test_a_difference_within_rounding_is_neither_worse_nor_better(
 def test_rounding_is_that_of_the_numbers_of_the_engine(
     engine: str, was: float, now: float, rounding: bool
 ):
-    assert is_rounding([engine], was, now) == is_rounding([engine], now, was) == rounding
-    assert is_rounding([engine, "box2d:matched"], 1e-6, 5e-6)
+    one, other, first, second = map(pd.Series, ([engine], ["box2d:matched"], [was], [now]))
+    assert is_rounding(one, one, first, second).all() == rounding
+    assert is_rounding(one, one, second, first).all() == rounding
+    assert is_rounding(one, other, pd.Series([1e-6]), pd.Series([5e-6])).all()
 
 
 def test_an_edited_scene_is_named_and_nothing_in_it_is_called_worse_or_better(
@@ -262,10 +262,7 @@ def test_an_edited_scene_is_named_and_nothing_in_it_is_called_worse_or_better(
     table.loc[table.metric == "position_max", "value"] *= 2
     put_table(table, after)
     changed = difference(before, after)
-    verdicts = {
-        scene: {one.verdict for one in (*changed.statuses, *changed.numbers) if scene in one.what}
-        for scene in PLAN.scenes
-    }
+    verdicts = {scene: verdicts_where(changed, "scenario", scene) for scene in PLAN.scenes}
 
     assert verdicts == {"near_miss": {"other", ROUNDING}, "slow_collision": {"worse"}}
     assert {engine: 2 * one.n for engine, one in changed.timings.items()} == timed
@@ -274,17 +271,22 @@ def test_an_edited_scene_is_named_and_nothing_in_it_is_called_worse_or_better(
     assert "near_miss: edited between the runs" in capsys.readouterr().out
 
 
-def test_a_cell_that_fails_now_is_worse_and_the_other_way_round_better(before: Path, after: Path):
+def test_a_cell_that_fails_now_is_worse_and_the_other_way_round_better(
+    before: Path, after: Path, capsys: pytest.CaptureFixture[str]
+):
     first = read(after).records[0]["cell"]
     change_cells(
         after, lambda cell: cell.update(status="crashed") if cell["cell"] == first else None
     )
 
-    assert [(one.after, one.verdict) for one in difference(before, after).statuses] == [
-        ("crashed", "worse")
+    [worse] = difference(before, after).changes.itertuples()
+    [better] = difference(after, before).changes.itertuples()
+    assert [(one.before, one.after, one.verdict) for one in (worse, better)] == [
+        ("ok", "crashed", "worse"),
+        ("crashed", "ok", "better"),
     ]
     assert exit_of(before, after) == 1
-    assert [one.verdict for one in difference(after, before).statuses] == ["better"]
+    assert "status: ok → crashed" in " ".join(capsys.readouterr().out.split())
 
 
 def test_cells_that_only_one_run_has_are_named_and_not_worse(
@@ -382,11 +384,13 @@ def test_a_scene_that_is_not_judged_any_more_is_worse(before: Path, after: Path)
     why = "not judged: the exact answer took longer than 60 s (--timeout)"
     lost = runs.assign(metric="status", value="", unit="", versus="truth", at_s="", note=why)
     put_table(pd.concat([judged, lost]), after)
-    worse, better = difference(before, after).statuses, difference(after, before).statuses
+    changes = [difference(*folders).changes for folders in ((before, after), (after, before))]
+    worse, better = (
+        set(x[["before", "after", "verdict"]].itertuples(index=False)) for x in changes
+    )
 
-    assert len(worse) == len(better) == len(runs) > 0
-    assert {(one.before, one.after, one.verdict) for one in worse} == {("judged", why, "worse")}
-    assert {(one.before, one.after, one.verdict) for one in better} == {(why, "judged", "better")}
+    assert [*map(len, changes)] == [len(runs)] * 2 != [0, 0]
+    assert (worse, better) == ({("judged", why, "worse")}, {(why, "judged", "better")})
     assert exit_of(before, after) == 1
 
 

@@ -11,7 +11,6 @@ from rich.cells import cell_len
 from rich.table import Table
 
 from crosscheck2d.adapters.engines import ENGINES
-from crosscheck2d.reports.commands.diff import Change
 from crosscheck2d.reports.stability.cases import CASES
 from crosscheck2d.reports.stability.command import print_limits
 from crosscheck2d.reports.stability.limits import LIMIT, NEVER_FAILS, NEVER_WORKS, Limit, Trial
@@ -228,10 +227,3 @@ def test_a_message_is_folded_between_words_and_a_path_stays_whole(
 def test_things_are_counted_in_one_way():
     assert [counted(n, "scene") for n in (0, 1, 2)] == ["0 scenes", "1 scene", "2 scenes"]
     assert [counted(n, "search", "searches") for n in (1, 2)] == ["1 search", "2 searches"]
-
-
-def test_a_change_between_two_runs_is_a_line():
-    what = "near_miss  dt 0.01 s  status"
-    change = Change("near_miss", "pymunk:matched", what, "ok", "crashed", "worse")
-
-    assert change.text == "worse: pymunk:matched, near_miss  dt 0.01 s  status: ok → crashed"
