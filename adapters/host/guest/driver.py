@@ -10,21 +10,22 @@ that a protected guest cannot read; preload: modules to import before the limits
 A line of JSON comes in, {"id", "open": ORDER} or {"id", "do": [[command, argument, limit s]]}, and
 one goes out, {"id", "done": [{"done": ...} or {"failed": {kind, what, line, column}}]}. The
 numbers of disks are float64 in base64.
+
+Every module that is imported here costs each guest some milliseconds: `inspect` and `traceback` are
+half of the start, and only engines need the first.
 """
 
 from __future__ import annotations
 
+import _socket  # `socket` itself takes 2 ms
 import array
 import ctypes
-import inspect
 import os
 import queue
 import random
 import re
 import signal
-import socket
 import sys
-import traceback
 from base64 import b64encode
 from collections import namedtuple
 from collections.abc import Callable, Iterator, Sequence
@@ -32,13 +33,13 @@ from contextlib import contextmanager, suppress
 from importlib import import_module
 from importlib.machinery import ModuleSpec, PathFinder
 from importlib.util import module_from_spec, spec_from_file_location
-from itertools import takewhile
+from itertools import islice, takewhile
 from json import dumps, loads  # before a guest can replace them
 from math import inf, isinf, nan
 from operator import index
 from threading import Thread
 from time import process_time
-from types import ModuleType
+from types import FrameType, ModuleType
 from typing import Any
 
 PATIENCE = 3  # times its limit of processor time that a call may take by the clock
@@ -469,6 +470,8 @@ def wrong(function: str, value: Any, wanted: str, what: str = "", kind: str = "e
 def most_arguments(function: Callable[..., Any]) -> int | None:
     # How many a function takes; None if any number, or it is not known. As in JavaScript it need
     # not take all that it is given.
+    import inspect
+
     try:
         kinds = [parameter.kind for parameter in inspect.signature(function).parameters.values()]
     except (TypeError, ValueError):
@@ -477,6 +480,12 @@ def most_arguments(function: Callable[..., Any]) -> int | None:
         return None
     positional = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
     return sum(kind in positional for kind in kinds)
+
+
+def runs_later(function: Callable[..., Any]) -> bool:
+    import inspect
+
+    return inspect.isgeneratorfunction(function) or inspect.iscoroutinefunction(function)
 
 
 # ---- a guest in Python --------------------------------------------------------------------------
@@ -519,7 +528,7 @@ class PythonGuest:
             self.file = {name: names[name] for name in ENGINE if callable(names.get(name))}
             self.takes = {name: most_arguments(function) for name, function in self.file.items()}
             for name, function in self.file.items():
-                if inspect.isgeneratorfunction(function) or inspect.iscoroutinefunction(function):
+                if runs_later(function):
                     raise Failed(
                         "error", f"{name} is an async def, or has a yield: it runs nothing"
                     )
@@ -535,6 +544,8 @@ class PythonGuest:
         self.functions["advance"] = self.world_of is ArraysWorld
 
     def methods_of(self, holder: type) -> dict[str, Any]:
+        import inspect
+
         create = vars(holder)["create"]
         own = inspect.isfunction(create) and [*inspect.signature(create).parameters][:1] == ["self"]
         with self.guarded(LOAD_LIMIT, "while it is loaded"):
@@ -588,9 +599,13 @@ class PythonGuest:
             what += "; input() is not available"
         if isinstance(error, SyntaxError) and error.filename == self.name:
             return Failed("error", what, error.lineno or 0, error.offset or 0)
-        stack = traceback.TracebackException.from_exception(error).stack
-        mine = [frame for frame in stack if frame.filename == self.name]
-        line, column = (mine[-1].lineno or 0, (mine[-1].colno or 0) + 1) if mine else (0, 0)
+        line, column, trace = 0, 0, error.__traceback__
+        while trace is not None:
+            code = trace.tb_frame.f_code
+            if code.co_filename == self.name:
+                (place,) = islice(code.co_positions(), trace.tb_lasti // 2, trace.tb_lasti // 2 + 1)
+                line, column = trace.tb_lineno or 0, (place[2] or 0) + 1
+            trace = trace.tb_next
         return Failed(kind, what, line, column)
 
     # ---- questions on spheres
@@ -685,8 +700,12 @@ class PythonGuest:
 
     def traced(self, numbers: list[float], k: int) -> Any:
         def access(kind: str, field: str) -> None:
-            stack = traceback.walk_stack(sys._getframe(2))
-            lines = [line for frame, line in stack if frame.f_code.co_filename == self.name]
+            lines: list[int] = []
+            frame: FrameType | None = sys._getframe(2)
+            while frame is not None:
+                if frame.f_code.co_filename == self.name:
+                    lines.append(frame.f_lineno)
+                frame = frame.f_back
             last = len(self.trail) > MOST  # only the latest accesses of an endless loop are kept
             self.trail[MOST if last else len(self.trail) :] = [(kind, k, field, lines)]
 
@@ -847,7 +866,8 @@ def attempts(secret: str) -> list[str]:
         if os.getppid() not in (0, 1):  # else in a world of its own
             os.kill(os.getppid(), 0)
             possible.append("signal")
-    with suppress(OSError), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
+    with suppress(OSError):
+        udp = _socket.socket(_socket.AF_INET, _socket.SOCK_DGRAM)
         udp.connect(("192.0.2.1", 9))  # an address for documentation; nothing is sent
         possible.append("network")
     return possible
