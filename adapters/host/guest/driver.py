@@ -187,12 +187,14 @@ def put(sphere: Any, r: Sequence[float]) -> None:
 def row_of(s: Any) -> list[float]:
     # The 12 numbers of a sphere; NaN for a field that is not a number.
     try:
-        numbers = [x for name in VECTORS for v in [getattr(s, name)] for x in (v.x, v.y)]
+        p, v, f = s.position, s.velocity, s.force
+        vectors = (p.x, p.y, v.x, v.y, f.x, f.y)
     except AttributeError:
         raise AttributeError(
             "a sphere is left with a position, velocity or force that has no x and y"
         ) from None
-    return [*map(number, numbers), *(number(getattr(s, name)) for name in SCALARS)]
+    scalars = (s.alpha, s.angularVelocity, s.torque, s.mass, s.MoI, s.size)
+    return [x if type(x) is float else number(x) for x in (*vectors, *scalars)]
 
 
 def everybody(module: ModuleType) -> list[Any]:
@@ -504,11 +506,13 @@ class PythonGuest:
         self.name = os.path.join(folder, order["name"])
         self.neighbours = Neighbours(dict(order["imported"]), folder)
         self.inside, self.replaced = "", list[str]()
+        self.known = ""  # the globals after the last question; "" if they may have changed since
         self.versions = {"python": ".".join(map(str, sys.version_info[:3]))}
         sys.meta_path.insert(0, self.neighbours)
         self.renew()
 
     def renew(self) -> None:
+        self.known = ""
         for name, loaded in list(sys.modules.items()):
             if getattr(getattr(loaded, "__spec__", None), "loader", None) is self.neighbours:
                 del sys.modules[name]
@@ -556,6 +560,8 @@ class PythonGuest:
 
     def run(self, command: str, argument: Any, limit: float) -> Any:
         self.inside = ""
+        if command != "ask":
+            self.known = ""
         with self.guarded(limit, "in one call"):
             return getattr(self, command)(*([] if argument is None else [argument]))
 
@@ -620,6 +626,9 @@ class PythonGuest:
         except (AttributeError, TypeError):
             return None
 
+    def witness(self) -> str:
+        return repr(self.globals())  # as text NaN equals NaN, and 0.0 is not -0.0
+
     def ask(self, question: dict[str, Any]) -> dict[str, Any]:
         """The answer to a question: the spheres after each call, and what was returned, changed
         elsewhere, or failed."""
@@ -629,7 +638,8 @@ class PythonGuest:
         before = self.numbers()
         self.spheres = spheres = self.placed(question)
         calls = self.watched(spheres) if question.get("watch") else []
-        known = None if question["world"] else self.globals()
+        known = "" if question["world"] else self.known or self.witness()
+        self.known = ""  # should a call not come back
         try:
             for name, *arguments in question["calls"]:
                 result = self.call(name, arguments, spheres)
@@ -645,11 +655,12 @@ class PythonGuest:
             raise
         except BaseException as raised:
             error = vars(self.failure(raised, "in one call"))
+        self.known = "" if question["world"] else self.witness()  # before the next question, too
         fields = {name for s in spheres if isinstance(s, Fields) for name in vars(s)}
         return {
             "states": states,
             "returned": returned,
-            "strayed": not question["world"] and repr(self.globals()) != repr(known),
+            "strayed": self.known != known,
             "strange": sorted(map(str, fields - NAMES)),
             "kept": [name for name, value in self.numbers().items() if before.get(name) != value],
             "calls": list(calls),  # a later question adds to it
