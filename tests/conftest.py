@@ -40,9 +40,9 @@ COLLECTED = pytest.StashKey[list[pytest.Item]]()
 
 @pytest.hookimpl(wrapper=True)
 def pytest_xdist_auto_num_workers() -> Generator[None, int, int]:
-    """One more than there are cores: a quarter of the time of the tests is waiting, for Chromium or
+    """Two a core: a third of the time of the tests is waiting, for Chromium or
     for another process."""
-    return (yield) + 1
+    return (yield) * 2
 
 
 @pytest.hookimpl(tryfirst=True)

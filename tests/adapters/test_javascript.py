@@ -167,10 +167,9 @@ def findings_of(name):
     return {finding.probe: finding for finding in conform(name, ROWS[name])}
 
 
-QUICK = ("planck:matched",)
-EACH = [
-    pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in ROWS
-]  # three to five seconds each
+# three to twenty seconds each
+MARKS = {"planck:matched": (), "shipped": pytest.mark.long, "matched": pytest.mark.slow}
+EACH = [pytest.param(name, marks=MARKS.get(name, MARKS[name.partition(":")[2]])) for name in ROWS]
 
 
 @fetched
@@ -402,7 +401,7 @@ def test_air_polygons_and_iterations_are_all_that_matter_does_along_a_line(scene
 
 
 @fetched
-@pytest.mark.slow
+@pytest.mark.long
 def test_of_oblique_collisions_with_matter_the_polygons_leave_a_tenth(
     monkeypatch: pytest.MonkeyPatch,
 ):

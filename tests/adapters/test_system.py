@@ -134,7 +134,7 @@ def test_the_portable_branch_gives_the_same_bits(tmp_path: Path):
 LIMITS = {"kernel": "the kernel", "portable": "a thread that watches the process"}
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_bad_engine_ends_the_same_on_the_portable_branch():
     chosen = "bad_cell and forkserver or limited_by_memory or what_a_file_does or ends_its_process"
     files = ["tests/reports/run/test_pool.py", "tests/adapters/test_own_solver.py"]
@@ -183,7 +183,13 @@ def test_an_endless_function_is_stopped_as_such(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("environment", [os.environ, PORTABLE], ids=["kernel", "portable"])
+@pytest.mark.parametrize(
+    "environment",
+    [
+        pytest.param(os.environ, id="kernel", marks=pytest.mark.long),
+        pytest.param(PORTABLE, id="portable"),
+    ],
+)
 def test_a_child_in_a_group_of_its_own_ends_with_its_solver(
     tmp_path: Path, environment: dict[str, str]
 ):
@@ -191,7 +197,9 @@ def test_a_child_in_a_group_of_its_own_ends_with_its_solver(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("child_does", ["pass", "os.closerange(0, 100)"])
+@pytest.mark.parametrize(
+    "child_does", ["pass", pytest.param("os.closerange(0, 100)", marks=pytest.mark.long)]
+)
 def test_a_child_ends_with_its_solver_that_has_ended_itself(tmp_path: Path, child_does: str):
     assert not lives_on(tmp_path, os.environ, child_does, "os._exit(0)")
 

@@ -45,7 +45,6 @@ def differing(fresh: dict[str, float | str | int], columns: tuple[str, ...]) -> 
 
 ROWS_OF_SUITES = (
     QUICK,
-    pytest.param(EVERY[::4], marks=pytest.mark.slow),
     pytest.param(EVERY, marks=pytest.mark.long),
 )
 
@@ -56,7 +55,7 @@ def box2d_alone(name: str, profile: str, substeps: int) -> dict[str, float | str
     return {"scenario": name, "profile": profile, "substeps": substeps, "box2d_radii": error}
 
 
-@pytest.mark.parametrize("rows", ROWS_OF_SUITES, ids=["some", "a quarter", "all"])
+@pytest.mark.parametrize("rows", ROWS_OF_SUITES, ids=["some", "all"])
 def test_box2d_gives_what_is_recorded_beside_planck(rows: list[tuple[str, str, int]]):
     """With the pinned version; else the command of planck.py writes the table anew."""
     wrong = [row for row in rows if differing(box2d_alone(*row), ("box2d_radii",))]
@@ -64,7 +63,7 @@ def test_box2d_gives_what_is_recorded_beside_planck(rows: list[tuple[str, str, i
 
 
 @fetched
-@pytest.mark.parametrize("rows", ROWS_OF_SUITES, ids=["some", "a quarter", "all"])
+@pytest.mark.parametrize("rows", ROWS_OF_SUITES, ids=["some", "all"])
 def test_planck_gives_what_is_recorded(rows: list[tuple[str, str, int]]):
     """Its error, and its distance from Box2D."""
     wrong = [row for row in rows if differing(measured(*row), ("planck_radii", "deviation_radii"))]

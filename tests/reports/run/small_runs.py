@@ -23,8 +23,8 @@ SMALL = [
     "--engine",
     "pymunk",
 ]
-# 48 cells, of 0.1 s or more
-LONG = "run asteroids gas_of_100 --timings 0 --engine reference:exercise --engine reference:lesson"
+# 24 cells, of 0.1 s or more
+LONG = "run asteroids --timings 0 --engine reference:exercise --engine reference:lesson"
 LONG = [*LONG.split(), "--engine", "pymunk", "--engine", "box2d"]
 
 
