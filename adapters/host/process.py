@@ -327,9 +327,10 @@ SPHERES = {"integrate": 1, "collide": 2}  # that a call is given
 
 
 def must_be_a_call(call: list[Any]) -> list[Any]:
-    if [k for k, item in enumerate(call) if type(item) is str] != [0]:
+    name, *numbers = call
+    if type(name) is not str or str in map(type, numbers):
         raise ValueError("a call is the name of its function, then numbers")
-    if len(call) <= SPHERES.get(call[0], 0):
+    if len(numbers) < SPHERES.get(name, 0):
         raise ValueError("a call lacks a sphere")
     return call
 

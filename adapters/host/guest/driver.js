@@ -35,6 +35,7 @@ Object.defineProperty(globalThis, "__host", { value: (() => {
   let world, steps, log, numbers;  // the world being played, its steps, its new collisions; what is handed back
   let accesses = "";  // what the last traced call read and wrote
   let spheres = empty();  // of the last question, which a call that failed may have changed
+  let known = "";  // the globals after the last question; "" if they may have changed since
   let answers = empty();  // to the last questions that were put together
 
   // What a package for browsers asks for.
@@ -211,7 +212,7 @@ Object.defineProperty(globalThis, "__host", { value: (() => {
 
   // One question: spheres, calls -> the spheres after each call, whether anything was returned, what went wrong.
   function ask(question) {
-    let returned = false, known = "", problem = "null";
+    let returned = false, was = "", problem = "null";
     const calls = empty(), states = empty();
     seed = 1;
     spheres = empty();
@@ -223,8 +224,9 @@ Object.defineProperty(globalThis, "__host", { value: (() => {
         if (question.watch) watch(calls);
       } else {
         for (let i = 0; i < question.spheres.length; i++) spheres[i] = sphere(question.spheres[i]);
-        known = witness();
+        was = known || witness();
       }
+      known = "";  // should a call not come back
       for (let k = 0; k < question.calls.length; k++) {
         const result = call(question.calls[k], spheres);
         if (result && typeof result.next === "function") {
@@ -235,8 +237,8 @@ Object.defineProperty(globalThis, "__host", { value: (() => {
         states[k] = rows(spheres);
       }
     } catch (error) { problem = described(error); }
-    const strayed = !question.world && witness() !== known;
-    return `{"states":${joined(states)},"returned":${returned},"strayed":${strayed},"strange":${list(strange(spheres), word, 9)},`
+    known = question.world ? "" : witness();
+    return `{"states":${joined(states)},"returned":${returned},"strayed":${known !== was},"strange":${list(strange(spheres), word, 9)},`
       + `"kept":${list(differences(before, globals()), word, 9)},"calls":${joined(calls)},"error":${problem}}`;
   }
 
@@ -604,6 +606,7 @@ Object.defineProperty(globalThis, "__host", { value: (() => {
   };
 
   function answer(name, argument) {
+    if (name !== "ask" && name !== "several") known = "";
     try { return `{"done":${commands[name](argument)}}`; }
     catch (error) { return `{"failed":${reportOf(error)}}`; }
   }

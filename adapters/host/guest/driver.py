@@ -10,21 +10,22 @@ that a protected guest cannot read; preload: modules to import before the limits
 A line of JSON comes in, {"id", "open": ORDER} or {"id", "do": [[command, argument, limit s]]}, and
 one goes out, {"id", "done": [{"done": ...} or {"failed": {kind, what, line, column}}]}. The
 numbers of disks are float64 in base64.
+
+Every module that is imported here costs each guest some milliseconds: `inspect` and `traceback` are
+half of the start, and only engines need the first.
 """
 
 from __future__ import annotations
 
+import _socket  # `socket` itself takes 2 ms
 import array
 import ctypes
-import inspect
 import os
 import queue
 import random
 import re
 import signal
-import socket
 import sys
-import traceback
 from base64 import b64encode
 from collections import namedtuple
 from collections.abc import Callable, Iterator, Sequence
@@ -32,13 +33,13 @@ from contextlib import contextmanager, suppress
 from importlib import import_module
 from importlib.machinery import ModuleSpec, PathFinder
 from importlib.util import module_from_spec, spec_from_file_location
-from itertools import takewhile
+from itertools import islice, takewhile
 from json import dumps, loads  # before a guest can replace them
 from math import inf, isinf, nan
 from operator import index
 from threading import Thread
 from time import process_time
-from types import ModuleType
+from types import FrameType, ModuleType
 from typing import Any
 
 PATIENCE = 3  # times its limit of processor time that a call may take by the clock
@@ -186,12 +187,14 @@ def put(sphere: Any, r: Sequence[float]) -> None:
 def row_of(s: Any) -> list[float]:
     # The 12 numbers of a sphere; NaN for a field that is not a number.
     try:
-        numbers = [x for name in VECTORS for v in [getattr(s, name)] for x in (v.x, v.y)]
+        p, v, f = s.position, s.velocity, s.force
+        vectors = (p.x, p.y, v.x, v.y, f.x, f.y)
     except AttributeError:
         raise AttributeError(
             "a sphere is left with a position, velocity or force that has no x and y"
         ) from None
-    return [*map(number, numbers), *(number(getattr(s, name)) for name in SCALARS)]
+    scalars = (s.alpha, s.angularVelocity, s.torque, s.mass, s.MoI, s.size)
+    return [x if type(x) is float else number(x) for x in (*vectors, *scalars)]
 
 
 def everybody(module: ModuleType) -> list[Any]:
@@ -469,6 +472,8 @@ def wrong(function: str, value: Any, wanted: str, what: str = "", kind: str = "e
 def most_arguments(function: Callable[..., Any]) -> int | None:
     # How many a function takes; None if any number, or it is not known. As in JavaScript it need
     # not take all that it is given.
+    import inspect
+
     try:
         kinds = [parameter.kind for parameter in inspect.signature(function).parameters.values()]
     except (TypeError, ValueError):
@@ -477,6 +482,12 @@ def most_arguments(function: Callable[..., Any]) -> int | None:
         return None
     positional = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
     return sum(kind in positional for kind in kinds)
+
+
+def runs_later(function: Callable[..., Any]) -> bool:
+    import inspect
+
+    return inspect.isgeneratorfunction(function) or inspect.iscoroutinefunction(function)
 
 
 # ---- a guest in Python --------------------------------------------------------------------------
@@ -495,11 +506,13 @@ class PythonGuest:
         self.name = os.path.join(folder, order["name"])
         self.neighbours = Neighbours(dict(order["imported"]), folder)
         self.inside, self.replaced = "", list[str]()
+        self.known = ""  # the globals after the last question; "" if they may have changed since
         self.versions = {"python": ".".join(map(str, sys.version_info[:3]))}
         sys.meta_path.insert(0, self.neighbours)
         self.renew()
 
     def renew(self) -> None:
+        self.known = ""
         for name, loaded in list(sys.modules.items()):
             if getattr(getattr(loaded, "__spec__", None), "loader", None) is self.neighbours:
                 del sys.modules[name]
@@ -519,7 +532,7 @@ class PythonGuest:
             self.file = {name: names[name] for name in ENGINE if callable(names.get(name))}
             self.takes = {name: most_arguments(function) for name, function in self.file.items()}
             for name, function in self.file.items():
-                if inspect.isgeneratorfunction(function) or inspect.iscoroutinefunction(function):
+                if runs_later(function):
                     raise Failed(
                         "error", f"{name} is an async def, or has a yield: it runs nothing"
                     )
@@ -535,6 +548,8 @@ class PythonGuest:
         self.functions["advance"] = self.world_of is ArraysWorld
 
     def methods_of(self, holder: type) -> dict[str, Any]:
+        import inspect
+
         create = vars(holder)["create"]
         own = inspect.isfunction(create) and [*inspect.signature(create).parameters][:1] == ["self"]
         with self.guarded(LOAD_LIMIT, "while it is loaded"):
@@ -545,6 +560,8 @@ class PythonGuest:
 
     def run(self, command: str, argument: Any, limit: float) -> Any:
         self.inside = ""
+        if command != "ask":
+            self.known = ""
         with self.guarded(limit, "in one call"):
             return getattr(self, command)(*([] if argument is None else [argument]))
 
@@ -588,9 +605,13 @@ class PythonGuest:
             what += "; input() is not available"
         if isinstance(error, SyntaxError) and error.filename == self.name:
             return Failed("error", what, error.lineno or 0, error.offset or 0)
-        stack = traceback.TracebackException.from_exception(error).stack
-        mine = [frame for frame in stack if frame.filename == self.name]
-        line, column = (mine[-1].lineno or 0, (mine[-1].colno or 0) + 1) if mine else (0, 0)
+        line, column, trace = 0, 0, error.__traceback__
+        while trace is not None:
+            code = trace.tb_frame.f_code
+            if code.co_filename == self.name:
+                (place,) = islice(code.co_positions(), trace.tb_lasti // 2, trace.tb_lasti // 2 + 1)
+                line, column = trace.tb_lineno or 0, (place[2] or 0) + 1
+            trace = trace.tb_next
         return Failed(kind, what, line, column)
 
     # ---- questions on spheres
@@ -605,6 +626,9 @@ class PythonGuest:
         except (AttributeError, TypeError):
             return None
 
+    def witness(self) -> str:
+        return repr(self.globals())  # as text NaN equals NaN, and 0.0 is not -0.0
+
     def ask(self, question: dict[str, Any]) -> dict[str, Any]:
         """The answer to a question: the spheres after each call, and what was returned, changed
         elsewhere, or failed."""
@@ -614,7 +638,8 @@ class PythonGuest:
         before = self.numbers()
         self.spheres = spheres = self.placed(question)
         calls = self.watched(spheres) if question.get("watch") else []
-        known = None if question["world"] else self.globals()
+        known = "" if question["world"] else self.known or self.witness()
+        self.known = ""  # should a call not come back
         try:
             for name, *arguments in question["calls"]:
                 result = self.call(name, arguments, spheres)
@@ -630,11 +655,12 @@ class PythonGuest:
             raise
         except BaseException as raised:
             error = vars(self.failure(raised, "in one call"))
+        self.known = "" if question["world"] else self.witness()  # before the next question, too
         fields = {name for s in spheres if isinstance(s, Fields) for name in vars(s)}
         return {
             "states": states,
             "returned": returned,
-            "strayed": not question["world"] and repr(self.globals()) != repr(known),
+            "strayed": self.known != known,
             "strange": sorted(map(str, fields - NAMES)),
             "kept": [name for name, value in self.numbers().items() if before.get(name) != value],
             "calls": list(calls),  # a later question adds to it
@@ -685,8 +711,12 @@ class PythonGuest:
 
     def traced(self, numbers: list[float], k: int) -> Any:
         def access(kind: str, field: str) -> None:
-            stack = traceback.walk_stack(sys._getframe(2))
-            lines = [line for frame, line in stack if frame.f_code.co_filename == self.name]
+            lines: list[int] = []
+            frame: FrameType | None = sys._getframe(2)
+            while frame is not None:
+                if frame.f_code.co_filename == self.name:
+                    lines.append(frame.f_lineno)
+                frame = frame.f_back
             last = len(self.trail) > MOST  # only the latest accesses of an endless loop are kept
             self.trail[MOST if last else len(self.trail) :] = [(kind, k, field, lines)]
 
@@ -847,7 +877,8 @@ def attempts(secret: str) -> list[str]:
         if os.getppid() not in (0, 1):  # else in a world of its own
             os.kill(os.getppid(), 0)
             possible.append("signal")
-    with suppress(OSError), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
+    with suppress(OSError):
+        udp = _socket.socket(_socket.AF_INET, _socket.SOCK_DGRAM)
         udp.connect(("192.0.2.1", 9))  # an address for documentation; nothing is sent
         possible.append("network")
     return possible
