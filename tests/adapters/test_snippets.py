@@ -19,6 +19,7 @@ from crosscheck2d.adapters.npm_packages import missing, pinned_library
 from crosscheck2d.adapters.snippets import TEMPLATES, write_snippet
 from crosscheck2d.scenarios.families.placing import lay_out
 from crosscheck2d.scenarios.model import Array, Scene
+from tests.thinned import thinned
 
 LACKING = [reason for row in FETCHED.values() if (reason := missing(row.package))]
 # two disks fall onto a floor and meet there, so that every setting of contacts acts
@@ -74,7 +75,7 @@ def test_a_snippet_moves_disks_as_the_adapter_does(name: str, scene: str):
 @pytest.mark.skipif(bool(LACKING), reason="; ".join(dict.fromkeys(LACKING)))
 @pytest.mark.slow
 @pytest.mark.parametrize("scene", SCENES)
-@pytest.mark.parametrize("name", FETCHED)
+@pytest.mark.parametrize("name", thinned(FETCHED, 3))
 def test_a_javascript_snippet_moves_disks_as_the_adapter_does(
     name: str, scene: str, tmp_path: Path
 ):

@@ -18,6 +18,7 @@ from crosscheck2d.adapters.host.engine import TEMPLATES, row_of_file
 from crosscheck2d.adapters.host.process import processes_reused
 from crosscheck2d.reports.page.findings import WORDS, is_lawless, own_engine_sentences
 from tests.reports.terminal.command_line import crosscheck
+from tests.thinned import thinned
 
 PROBES = (*LAWS, "order_and_shapes", "load_forgets", "static_stays", "pair_momentum")
 # As a stranger writes one: disks and gravity alone, no rotation, no walls, no list of collisions.
@@ -181,7 +182,7 @@ def probed(path: Path, *probes: str) -> list[dict[str, Any]]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.parametrize("fault", thinned(FAULTS, 3))
 def test_the_sentence_of_an_engine_begins_with_its_fault(fault: str, tmp_path: Path):
     text, changes, words = FAULTS[fault]
     findings = probed(written(tmp_path, text, changes))

@@ -80,7 +80,13 @@ JAVASCRIPT = [
 
 @pytest.mark.parametrize(
     ("scene", "engine", "expected"),
-    [*PYTHON, *(pytest.param(*case, marks=[fetched, pytest.mark.slow]) for case in JAVASCRIPT)],
+    [
+        *PYTHON,
+        *(
+            pytest.param(*case, marks=[fetched, pytest.mark.long if k % 3 else pytest.mark.slow])
+            for k, case in enumerate(JAVASCRIPT)
+        ),
+    ],
 )
 def test_the_default_that_bites_is_named_with_what_to_set(
     scene: str, engine: str, expected: str, tmp_path: Path
