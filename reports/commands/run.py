@@ -19,6 +19,7 @@ from crosscheck2d.adapters.advance import off_grid_note
 from crosscheck2d.adapters.engines import OWN, row_of
 from crosscheck2d.adapters.run import STATUSES
 from crosscheck2d.reports.commands.own_solvers import checks_of, lines
+from crosscheck2d.reports.compare.fast_disks import fast_note
 from crosscheck2d.reports.page.report import PAGE, Report, make_report, take_times
 from crosscheck2d.reports.page.scenes import SceneScores, values
 from crosscheck2d.reports.page.style import number
@@ -214,10 +215,11 @@ def print_summary(report: Report) -> None:
             console.print(f"Without a model of friction: {', '.join(without)}.", highlight=False)
         console.print()
     checks = ["\n".join(lines(name, says)) for name, says in report.said.items()]
-    notes = [  # of thrusts that start or stop inside a step
+    notes = [  # of thrusts that start or stop inside a step, and of disks that are fast for it
         f"{scene.name}: {note.removesuffix('.')}."
         for scene in scenes
-        if (note := off_grid_note(scene.comparison.scenario))
+        for note in (off_grid_note(scene.comparison.scenario), fast_note(scene.comparison))
+        if note
     ]
     counts = report.runs.status.value_counts()
     statuses = ", ".join(f"{counts[status]} {status}" for status in STATUSES if status in counts)

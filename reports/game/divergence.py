@@ -20,15 +20,18 @@ NEVER = 2**31  # a frame that no flight has
 
 
 class FlightEvent(NamedTuple):
-    """What happened in a frame at (x, y) m."""
+    """What happened in a frame at (x, y) m.
+
+    disks: the two that collided for the first time in that frame (wall w as -1 - w); the one whose
+    velocity came to differ without a collision; or none: the ship left the field, and was seen
+    there last. t: s on the flight's clock, of a collision.
+    """
 
     frame: int
     x: float
     y: float
-    # the two that collided for the first time in that frame (wall w as -1 - w); the one whose
-    # velocity came to differ without a collision; or none: the ship left the field
     disks: tuple[int, ...] = ()
-    t: float = 0.0  # s on the flight's clock, of a collision
+    t: float = 0.0
 
 
 class Divergence(NamedTuple):
@@ -42,7 +45,12 @@ class Divergence(NamedTuple):
 
 class Touches:
     """The first collision of every disk in each of the last frames of one engine, and how many
-    collisions there were. `dt`: s, of a step; `weight`: N s, of `weight_impulse`."""
+    collisions there were.
+
+    scene: whose radii tell where two disks touch.
+    dt: s, of a step.
+    weight: N s, of `weight_impulse`.
+    """
 
     def __init__(self, scene: Scene, dt: float, weight: float) -> None:
         self.radius, self.dt, self.weight, self.count = scene.radius, dt, weight, 0
@@ -55,8 +63,11 @@ class Touches:
     def note(
         self, collisions: Iterable[ContactImpulse], frame: int, before: State, began: float
     ) -> None:
-        """`collisions` happened in frame `frame`, after `before`, the state at `began` s, which
-        tells where: afterwards a faulty solver may have thrown the disks across the field."""
+        """`collisions` happened in frame `frame`, after `before`, the state at `began` s.
+
+        Where two disks touched is found from `before`: afterwards a faulty solver may have thrown
+        them across the field.
+        """
         self.recent = [touch for touch in self.recent if touch.frame >= frame - WAIT]
         struck = {disk for touch in self.recent if touch.frame == frame for disk in touch.disks}
         for collision in collisions:
@@ -73,8 +84,12 @@ class Touches:
                 struck |= {i, j}
 
     def begins(self, collision: ContactImpulse) -> bool:
-        """Whether an impulse is a collision of its own, as `first_collisions` counts them; one by
-        one, because a faulty solver may have thousands a second."""
+        """Whether an impulse is a collision of its own, as `first_collisions` counts
+        them, but for one that only a later impulse shows to be rounding.
+
+        One by one: a faulty solver may have thousands a second, which are not counted anew in every
+        frame.
+        """
         i, j, size = collision.i, collision.j, abs(collision.impulse)
         pair = (min(i, j), max(i, j))
         self.strongest[pair] = strongest = max(size, self.strongest.get(pair, 0.0))
@@ -102,7 +117,8 @@ def cause_of(
     since: Array, solid: Touches, ghost: Touches, state: State, frame: int
 ) -> tuple[FlightEvent, bool, bool] | None:
     """What made a disk differ that has done so for `WAIT` frames by the end of frame `frame`, and
-    whether it happened in the solid engine and in the ghost, whose `state` this is."""
+    whether it happened in the solid engine and in the ghost; None if no disk has. `state`: the
+    ghost's."""
     first = int(since.min())
     if frame - first + 1 < WAIT:
         return None

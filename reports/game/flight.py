@@ -67,16 +67,20 @@ def field_scenario(
 
 @dataclass
 class Pilot:
-    """Keys in, one force and one torque at a time out; keys act at the start of a frame, which
-    lasts `interval` s.
+    """Keys in, one force and one torque at a time out, kept as thrusts. `interval`: s, of a frame;
+    keys act at the start of one.
 
     W and S accelerate along the ship's heading as it is when the key event comes (a repeated event
     aims anew), A and D turn; releasing either key of a pair ends its thrust, as in the exercise.
+
+    Attributes:
+        held: the force and the torque that are on, without an end.
+        past: those that have ended.
     """
 
     scene: Scene
     interval: float
-    held: dict[str, Thrust] = field(default_factory=dict)  # without an end
+    held: dict[str, Thrust] = field(default_factory=dict)
     past: list[Thrust] = field(default_factory=list)
 
     def key(self, key: str, down: bool, frame: int, angle: float) -> None:
@@ -106,26 +110,42 @@ class Pilot:
 
 @dataclass
 class Flyer:
-    """The ship and the field as one engine has them."""
+    """The ship and the field as one engine has them.
 
-    name: str  # `engine:profile`
+    Attributes:
+        name: `engine:profile`.
+        state: at the end of the last frame.
+        touches: the latest collisions, and how many there were.
+        differs: (n,) frame since which each disk has had another velocity than in the solid one.
+        left: why it flies no more, or "".
+        left_at: s on the flight's clock, the end of the frame in which it left.
+        edges: where and when its ship left the field and was set back, each time.
+        beside: whether the start was taken when its ship was set back last.
+        seen: how many of its collisions since then are in `touches`.
+        divergence: where it diverged from the solid one.
+    """
+
+    name: str
     engine: Engine
-    state: State  # at the end of the last frame
+    state: State
     touches: Touches
-    differs: Array  # (n,) frame since which each disk has had another velocity than in the solid
-    left: str = ""  # why it flies no more
-    left_at: float = 0.0  # s on the flight's clock, the end of the frame in which it left
-    edges: list[FlightEvent] = field(default_factory=list)  # where its ship left the field
-    seen: int = 0  # how many of the engine's collisions are in `touches`
-    divergence: Divergence | None = None  # from the solid one
+    differs: Array
+    left: str = ""
+    left_at: float = 0.0
+    edges: list[FlightEvent] = field(default_factory=list)
+    beside: bool = False
+    seen: int = 0
+    divergence: Divergence | None = None
 
-    def leave(self, reason: str, at: float) -> None:
+    def leave(self, reason: Exception | str, at: float) -> None:
+        if isinstance(reason, Exception):
+            reason = on_the_clock(reason, self.touches.since)
         self.left, self.left_at = reason, at
 
 
 def free_place(scene: Scene, position: Array) -> Array:
     """(2,) m, the place nearest to the ship's start where it is `CLEARANCE` away from every other
-    disk, because an event engine cannot begin with an overlap; the start, if there is none."""
+    disk; the start, if there is none."""
     start, radius = scene.position[SHIP], scene.radius[SHIP]
     low, high = np.array([LOW, HIGH]) + radius * np.array([[1], [-1]])
     grid = np.stack(np.meshgrid(*(np.arange(*ends, GRID) for ends in zip(low, high))), -1)
@@ -154,8 +174,10 @@ class Flight:
     unless it is a replay.
 
     The ship that leaves the exercise's field is set back to its start, at rest, at the end of that
-    frame, in each engine by itself: the engine is loaded anew with all else as it is. In any other
-    scene with a wrap disk 0 wraps like the rest, as it does in `play`.
+    step, as in the exercise, and in each engine by itself: the engine is loaded anew with all else
+    as it is. Where the start is taken, the ship goes to the nearest free place, because an event
+    engine cannot begin with an overlap. In any other scene with a wrap disk 0 wraps like the rest,
+    as it does in `play`.
     """
 
     def __init__(self, scenario: Scenario, names: Sequence[str], replayed: bool = False) -> None:
@@ -180,12 +202,19 @@ class Flight:
                 flyer.engine.load(scene, self.dt)
                 flyer.state = flyer.engine.read()
             except Exception as error:  # a missing library, a refusal, or whatever an engine raises
-                flyer.leave(str(error) or type(error).__name__, 0.0)
+                flyer.leave(error, 0.0)
 
     @property
     def solid(self) -> Flyer:
         """The first that still flies; the first of all if none does."""
         return next((flyer for flyer in self.flyers if not flyer.left), self.flyers[0])
+
+    @property
+    def solid_since(self) -> float:
+        """s on the flight's clock when the solid one took over from the last that left; 0.0: it has
+        been solid from the start."""
+        left = [flyer.left_at for flyer in self.flyers[: self.flyers.index(self.solid)]]
+        return max(left, default=0.0)
 
     @property
     def over(self) -> bool:
@@ -212,11 +241,8 @@ class Flight:
             if self.over:
                 return
             flyers = [flyer for flyer in self.flyers if not flyer.left]
-            waiting = [
-                self.threads.submit(self.fly, flyer)
-                for flyer in flyers
-                if isinstance(flyer.engine, GuestEngine)
-            ]
+            guests = [flyer for flyer in flyers if isinstance(flyer.engine, GuestEngine)]
+            waiting = [self.threads.submit(self.fly, flyer) for flyer in guests]
             for flyer in flyers:
                 if not isinstance(flyer.engine, GuestEngine):
                     self.fly(flyer)
@@ -231,28 +257,49 @@ class Flight:
                     ghost.divergence = self.divergence_of(ghost)
 
     def fly(self, flyer: Flyer) -> None:
-        """One frame of one engine, by the same steps as `play` makes them; what it raises or does
-        wrong makes it leave."""
-        before, first = flyer.state, self.frame * self.substeps
-        now = (self.frame + 1) * self.scenario.sample_interval
-        try:
-            advance(flyer.engine, self.steered, first, self.substeps, self.dt)
-            state, collisions = flyer.engine.read(), flyer.engine.collisions()
-        except Exception as error:  # a refusal, or whatever an engine raises
-            flyer.leave(on_the_clock(error, flyer.touches.since), now)
-            return
-        if fault := fault_of(state, self.farthest):
-            flyer.leave(fault, now)
-            return
-        flyer.state = state
-        flyer.touches.note(collisions[flyer.seen :], self.frame, before, first * self.dt)
-        flyer.seen = len(collisions)
-        jump = np.abs(state.position[SHIP] - before.position[SHIP])
-        if self.is_game and (jump > np.subtract(HIGH, LOW) / 2).any():  # onto the opposite edge
-            flyer.edges.append(FlightEvent(self.frame, *before.position[SHIP].tolist()))
-            self.set_back(flyer, now)
+        """One frame of one engine, by the same steps as `play` makes them, looked at once or, near
+        an edge, at each."""
+        stride = 1 if self.may_leave(flyer.state) else self.substeps
+        first = self.frame * self.substeps
+        for step in range(first, first + self.substeps, stride):
+            if not flyer.left:
+                self.fly_on(flyer, step, stride)
 
-    def set_back(self, flyer: Flyer, now: float) -> None:
+    def may_leave(self, state: State) -> bool:
+        """Whether the ship is so near an edge that a frame may carry it beyond: by its own
+        velocity, or by that of whatever strikes it.
+
+        One that is displaced further, as out of a deep overlap, is set back at the end of the frame
+        instead of the step.
+        """
+        fastest = np.abs(state.velocity).max(axis=0)
+        room = 2 * (np.abs(state.velocity[SHIP]) + fastest) * self.scenario.sample_interval
+        ship, low, high = state.position[SHIP], np.add(LOW, room), np.subtract(HIGH, room)
+        return self.is_game and bool(((ship < low) | (ship > high)).any())
+
+    def fly_on(self, flyer: Flyer, step: int, count: int) -> None:
+        """`count` steps of one engine from step number `step` on; what it raises or does wrong
+        makes it leave."""
+        before, ends = flyer.state, (self.frame + 1) * self.scenario.sample_interval
+        try:
+            advance(flyer.engine, self.steered, step, count, self.dt)
+            flyer.state = flyer.engine.read()
+            collisions = flyer.engine.collisions()
+        except Exception as error:  # a refusal, or whatever an engine raises
+            flyer.leave(error, ends)
+            return
+        if fault := fault_of(flyer.state, self.farthest):
+            flyer.state = before
+            flyer.leave(fault, ends)
+            return
+        if len(collisions) > flyer.seen:
+            flyer.touches.note(collisions[flyer.seen :], self.frame, before, step * self.dt)
+            flyer.seen = len(collisions)
+        jump = np.abs(flyer.state.position[SHIP] - before.position[SHIP])
+        if self.is_game and (jump > np.subtract(HIGH, LOW) / 2).any():  # onto the opposite edge
+            self.set_back(flyer, before, (step + count) * self.dt)
+
+    def set_back(self, flyer: Flyer, before: State, now: float) -> None:
         scene = self.scenario.scene
         arrays: dict[str, Any] = {
             name: np.array(array) for name, array in vars(flyer.state).items()
@@ -260,6 +307,8 @@ class Flight:
         for name, array in arrays.items():
             array[SHIP] = getattr(scene, name)[SHIP]
         arrays["position"][SHIP] = free_place(scene, arrays["position"])
+        flyer.beside = bool((arrays["position"][SHIP] != scene.position[SHIP]).any())
+        flyer.edges.append(FlightEvent(self.frame, *before.position[SHIP].tolist()))
         flyer.touches.begin_again(SHIP, now)
         flyer.seen = 0
         try:
@@ -308,7 +357,11 @@ class Flight:
 
     def saved(self) -> Scenario:
         """The flight so far as a scenario, up to the frame before the ship first left: a scene has
-        no way back. Raises `ValueError` if there is no frame to save."""
+        no way back.
+
+        Raises:
+            ValueError: if there is no frame to save.
+        """
         if self.replayed:
             return self.scenario
         frames = self.frame if self.left_at < 0 else self.left_at

@@ -10,7 +10,7 @@ class Game {
     this.sky = new Field(by("sky"));
     this.rows = [...document.querySelectorAll("tr[data-engine]")];
     this.chosen = document.querySelector("[name=solid]:checked").value;  // solid when a flight begins
-    Object.assign(this, { field: null, now: null, waiting: 0, owed: 0, paused: reducedMotion.matches, down: new Set(), stopped: new Set(), gone: new Set(), pace: [], drawn: [] });
+    Object.assign(this, { field: null, frames: [], waiting: 0, owed: 0, paused: reducedMotion.matches, down: new Set(), stopped: new Set(), gone: new Set(), pace: [], drawn: [] });
     this.listen();
     this.connect();
     requestAnimationFrame((now) => this.tick(now));
@@ -18,10 +18,7 @@ class Game {
 
   connect() {
     this.socket = new WebSocket(`ws://${location.host}/fly`);
-    this.socket.onopen = () => {
-      if (this.field) location.reload();  // the server may have been started anew, with other engines
-      else this.say("Starting the engines. The first start compiles them, which takes a while …");
-    };
+    this.socket.onopen = () => { this.say(this.field ? "" : "Starting the engines. The first start compiles them, which takes a while …"); if (this.field) this.begin(); };
     this.socket.onmessage = (event) => this.hear(JSON.parse(event.data));
     this.socket.onclose = (event) => {
       this.say(`${event.reason || "The server does not answer"}. Trying again …`);
@@ -42,22 +39,25 @@ class Game {
   }
 
   open(field) {
-    Object.assign(this, { field, now: field.first, waiting: 0, owed: 0 });
+    if (field.server && field.server !== document.body.dataset.server) { location.reload(); return; }  // started anew: other engines, or another flight
+    Object.assign(this, { field, frames: [field.first, field.first], waiting: 0, owed: 0 });
     this.stopped.clear();
     this.gone.clear();
     this.say("");
     this.sky.begin(field);
     this.showPaused();
-    this.nameThoseWhoLeave(field.first, 0);
+    this.nameThoseWhoLeave(field.first);
     this.show();
   }
 
   arrive(frame) {
-    const before = this.now;
-    Object.assign(this, { now: frame, waiting: 0 });
-    recent(this.pace, [performance.now(), frame.ms, frame.t]);
+    this.frames = [this.frames[1], frame];
+    this.arrived = performance.now();
+    this.span = (frame.frame - this.frames[0].frame) * this.field.interval * 1000;
+    recent(this.pace, [this.arrived, frame.ms, frame.t]);
+    this.waiting = 0;
     this.stopWhereTheyPart(frame);
-    this.nameThoseWhoLeave(frame, before.solid);
+    this.nameThoseWhoLeave(frame);
     this.show();
   }
 
@@ -67,11 +67,11 @@ class Game {
     if (diverged.length && by("stop").checked) this.pause(true);
   }
 
-  nameThoseWhoLeave(frame, before) {
+  nameThoseWhoLeave(frame) {
     const left = this.field.engines.filter((name, k) => frame.flyers[k].left && !this.gone.has(name));
     left.forEach((name) => this.gone.add(name));
     const said = left.map((name) => `${shortName(name)} ${farewell(frame.flyers[this.field.engines.indexOf(name)])}`);
-    if (frame.solid && left.includes(this.field.engines[before])) said.push(`${shortName(this.field.engines[frame.solid])} is solid from here on`);
+    if (frame.solid && left.includes(this.field.engines[this.frames[0].solid])) said.push(`${shortName(this.field.engines[frame.solid])} is solid from here on`);
     if (left.length) this.announce(said.join("; "));
   }
 
@@ -91,20 +91,34 @@ class Game {
     requestAnimationFrame((later) => this.tick(later));
   }
 
+  get now() { return this.frames[1]; }
+
   ask(count) { this.wait(count); this.send({ do: "frames", count }); }
 
   wait(count) { Object.assign(this, { waiting: count, asked: performance.now() }); }
 
+  // Between the last two frames that came, as far as time has gone on since: motion is smooth at any rate of the screen.
   draw(now) {
     const began = performance.now();
-    const frame = this.now;
-    const flyers = frame.flyers.map(({ left, x, angle }, k) => ({
-      name: this.field.engines[k], label: shortName(this.field.engines[k]), gone: left,
-      at: angle.map((turn, disk) => [x[2 * disk], x[2 * disk + 1], turn]),
+    const share = this.span ? Math.min(1, (now - this.arrived) / this.span) : 1;
+    const [before, after] = this.frames;
+    const flyers = after.flyers.map((flyer, k) => ({
+      name: this.field.engines[k], label: shortName(this.field.engines[k]), gone: flyer.left,
+      at: this.field.radius.map((_, disk) => this.between(before.flyers[k], flyer, disk, this.paused ? 1 : share)),
     }));
-    const marks = frame.flyers.flatMap((flyer, k) => this.marksOf(flyer, this.field.engines[k]));
-    this.sky.draw(flyers, frame.solid, frame.force, marks);
+    const marks = after.flyers.flatMap((flyer, k) => this.marksOf(flyer, this.field.engines[k]));
+    this.sky.draw(flyers, after.solid, after.force, marks);
     recent(this.drawn, [now, performance.now() - began]);
+  }
+
+  between(before, after, disk, share) {
+    const mix = (a, b, span) => Math.abs(b - a) > span / 2 ? b : a + share * (b - a);  // half the field in a frame: it wrapped
+    const [left, bottom, right, top] = this.field.wrap ?? [-Infinity, -Infinity, Infinity, Infinity];
+    return [
+      mix(before.x[2 * disk], after.x[2 * disk], right - left),
+      mix(before.x[2 * disk + 1], after.x[2 * disk + 1], top - bottom),
+      mix(before.angle[disk], after.angle[disk], Infinity),
+    ];
   }
 
   // Where it diverged, and where its ship was when it left. Names only, so that labels leave the field free: the table says the rest.
@@ -127,7 +141,7 @@ class Game {
     banner.classList.toggle("won", frame.won);
     if (frame.won) this.tell("You won");
     else if (frame.over) this.tell(this.field.replayed ? "The flight ends here" : "The flight is over");
-    else if (frame.set_back && frame.t - frame.set_back < 3) this.tell("The ship left the field: back to the free place nearest to its start");
+    else if (frame.set_back && frame.t - frame.set_back.t < 3) this.tell(`The ship left the field: back to the ${frame.set_back.beside ? "free place nearest to the start, which is taken" : "start"}`);
     else if (this.paused) this.tell(frame.frame ? "Paused" : "P starts the flight");
     else this.tell("");
     this.showPace(frame);
@@ -142,13 +156,22 @@ class Game {
     put("ship_deviation", flies && !solid ? figure(flyer.ship_deviation) : "");
     put("deviation", flies && !solid ? figure(flyer.deviation) : "");
     put("collisions", flyer ? String(flyer.collisions) : "");
-    put("diverged", flyer ? this.story(flyer) : "");
+    put("diverged", flyer ? this.story(flyer, row.dataset.engine) : "");
     cell("diverged").classList.toggle("gone", Boolean(flyer?.left));
   }
 
-  story(flyer) {
+  story(flyer, name) {
     if (flyer.left) return farewell(flyer);
-    return flyer.diverged ? this.divergence(flyer.diverged, this.now.solid) : "";
+    const { solid, solid_since: since } = this.now;
+    const told = flyer.diverged ? [this.divergence(flyer.diverged, solid)] : [];
+    if (since && name === this.field.engines[solid]) told.push(`solid since ${since.toFixed(2)} s, when ${shortName(this.lastSolid())} left`);
+    return told.join("; ");
+  }
+
+  // The one that the solid one took over from.
+  lastSolid() {
+    const { flyers, solid, solid_since: since } = this.now;
+    return this.field.engines[flyers.slice(0, solid).findLastIndex((flyer) => flyer.left_at === since)];
   }
 
   divergence({ t, disks: [i, j], solid, only }, now) {
@@ -264,8 +287,28 @@ const keyOf = (event) => KEYS[event.key] ?? KEYS[event.key.toLowerCase()];
 const farewell = ({ left, left_at: at }) => at ? `left at ${at.toFixed(2)} s: ${left}` : `does not fly: ${left}`;
 const bodyOf = (k) => k === SHIP ? "ship" : k < 0 ? `wall ${-1 - k}` : `disk ${k}`;
 const pairOf = (i, j) => i === SHIP || j !== SHIP ? `${bodyOf(i)} and ${bodyOf(j)}` : pairOf(j, i);
-const figure = (value) => value === 0 ? "0" : value.toPrecision(4);
-const vector = (pair) => pair.map((part) => (Number(part.toFixed(3)) || 0).toFixed(3)).join(", ");  // || 0: no -0
+const raised = (digits) => [...digits].map((digit) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[digit]).join("");
+
+// Every number of the table has so many significant digits: more would only flicker. Below a millionth of a unit one is enough.
+const DIGITS = 4;
+const decimals = (value) => Math.max(0, DIGITS - 1 - Math.floor(Math.log10(Math.abs(value)) + 1e-9));
+const rounded = (value) => Number(value.toPrecision(DIGITS));
+const figure = (value) => {
+  if (value === 0) return "0";
+  if (Math.abs(value) >= 1e6 || Math.abs(value) < 1e-3) return power(value);
+  return rounded(value).toFixed(decimals(rounded(value)));
+};
+const power = (value) => {
+  const [digits, exponent] = value.toExponential(Math.abs(value) < 1e-6 ? 0 : DIGITS - 1).split("e");
+  return `${digits}×10${exponent < 0 ? "⁻" : ""}${raised(exponent.replace(/[+-]/, ""))}`;
+};
+// As many decimals as the larger component has: what is left of the smaller one is no better known.
+const vector = (pair) => {
+  const largest = Math.max(...pair.map(Math.abs));
+  if (largest < 1e-3 || largest >= 1e6) return pair.map(figure).join(", ");
+  const place = decimals(rounded(largest));
+  return pair.map((part) => (Number(part.toFixed(place)) || 0).toFixed(place)).join(", ");  // || 0: no -0
+};
 const labels = Object.fromEntries([...document.querySelectorAll("tr[data-engine]")].map(({ dataset }) => [dataset.engine, dataset.label]));
 const shortName = (name) => labels[name];
 const mean = (rows) => rows.reduce((sum, row) => sum + row[1], 0) / rows.length;

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import json
 from asyncio import CancelledError
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
+from secrets import token_hex
 from time import monotonic
+from typing import Any
 from urllib.parse import urlsplit
 
 from starlette.requests import Request
@@ -33,14 +35,22 @@ POLICY, LATER = 1008, 1013  # WebSocket close codes: it breaks the rules; try ag
 
 @dataclass
 class Game:
-    """What every tab begins with, and how many are open."""
+    """What every tab begins with, how many are open, and by what a page knows its own server from a
+    later one.
 
-    engines: Sequence[str]  # the solid one first
-    file: Scenario | None = None  # the flight that is flown again; None: keys steer
-    restitution: float = 0.9  # of the first field
-    # engine -> what `check` says of its file
+    Attributes:
+        engines: that fly, the solid one first.
+        file: the flight that is shown again; None: keys steer.
+        restitution: of the first field.
+        said: engine -> what `check` says of its file.
+    """
+
+    engines: Sequence[str]
+    file: Scenario | None = None
+    restitution: float = 0.9
     said: Mapping[str, Sequence[Said]] = field(default_factory=dict)
     tabs: int = 0
+    mark: str = field(default_factory=lambda: token_hex(8))
 
     async def page(self, _: Request) -> HTMLResponse:
         # in space there is no friction, and who adds it gives the bits of another engine
@@ -53,13 +63,16 @@ class Game:
             styles=["page/live.css", "game/game.css"],
             looks=looks_of(rows),
             connects=True,
-            game=self,
             rows=rows,
             labels=labels(list(rows)),
-            substeps=SUBSTEPS,
-            frame=FRAME,
+            flown=list(self.engines),
+            steps={k: FRAME / k for k in SUBSTEPS},
+            file=self.file,
+            mark=self.mark,
             diverged=DIVERGED,
             wait=WAIT,
+            restitution=self.restitution,
+            said=self.said,
         )
         return HTMLResponse(page)
 
@@ -79,7 +92,7 @@ class Game:
         try:
             session = await in_thread(Session, self.engines, self.file, self.restitution)
             with suppress(WebSocketDisconnect):
-                await socket.send_json(session.field())
+                await send(socket, session.field() | {"server": self.mark})
                 await converse(socket, session)
         finally:
             if session is not None and not session.given_up:
@@ -88,15 +101,20 @@ class Game:
 
 
 def labels(names: Sequence[str]) -> dict[str, str]:
-    """How the field calls each engine: a solver's file by its name, with that of its folder where
-    several have one name."""
-    files = {name: Path(name.removesuffix(OWN)) for name in names if name.endswith(OWN)}
-    count = Counter(path.name for path in files.values())
-    ends = {
-        name: path.name if count[path.name] == 1 else f"{path.parent.name}/{path.name}"
-        for name, path in files.items()
-    }
-    return {name: ends.get(name, name) for name in names}
+    """How the field calls each engine: a solver's file by as much of the end of its path as tells
+    it from the others, all else by its name."""
+    paths = {name: Path(name.removesuffix(OWN)).parts for name in names if name.endswith(OWN)}
+    ends = {name: name for name in names}
+    for name, parts in paths.items():
+        others = [path for key, path in paths.items() if key != name]
+        tails = (parts[-k:] for k in range(1, len(parts) + 1))
+        unique = (tail for tail in tails if all(path[-len(tail) :] != tail for path in others))
+        ends[name] = "/".join(next(unique, parts))
+    return ends
+
+
+async def send(socket: WebSocket, answer: dict[str, Any]) -> None:
+    await socket.send_text(json.dumps(answer, separators=(",", ":")))
 
 
 async def converse(socket: WebSocket, session: Session) -> None:
@@ -130,7 +148,7 @@ async def converse(socket: WebSocket, session: Session) -> None:
             await socket.close(POLICY, f"more than {MOST_FAULTS} faulty messages")
             return
         if answer is not None:
-            await socket.send_json(answer)
+            await send(socket, answer)
 
 
 def routes(game: Game) -> list[BaseRoute]:

@@ -72,7 +72,11 @@ _ANY: TypeAdapter[Message] = TypeAdapter(Annotated[Message, Field(discriminator=
 
 
 def read_message(text: str | bytes) -> Message:
-    """The message in `text`, JSON; raises `ValueError`, one sentence that names every fault."""
+    """The message in `text`, JSON.
+
+    Raises:
+        ValueError: one sentence that names every fault.
+    """
     if len(text) > MOST_BYTES:
         raise ValueError(f"the message has {len(text)} bytes; must have at most {MOST_BYTES}")
     try:
@@ -86,12 +90,16 @@ def read_message(text: str | bytes) -> Message:
 
 
 class Session:
-    """A page and its flight, or the flight of a `file`, flown again."""
+    """A page and its flight. `file`: the flight that is flown again, instead of one that is
+    steered.
+
+    Attributes:
+        given_up: nobody waits for its answer any more, and it may still be at it.
+    """
 
     def __init__(
         self, engines: Sequence[str], file: Scenario | None = None, restitution: float = 0.9
     ) -> None:
-        # `given_up`: nobody waits for its answer any more, and it may still be at it
         self.file, self.given_up = file, False
         self.flight = self.begin(Fly(do="fly", engines=list(engines), restitution=restitution))
 
@@ -149,6 +157,7 @@ class Session:
             "frame": flight.frame,
             "t": flight.frame * interval,
             "solid": flight.flyers.index(solid),
+            "solid_since": flight.solid_since,
             "flyers": [self.to_json(flyer) for flyer in flight.flyers],
             "ship": [
                 *ship.position[SHIP].tolist(),
@@ -159,7 +168,8 @@ class Session:
             "force": self.force(),
             "won": flight.won,
             "over": flight.over,
-            "set_back": last and (last.frame + 1) * interval,  # when the solid ship was, s
+            # when the solid ship was set back last, s, and whether beside its start
+            "set_back": last and {"t": (last.frame + 1) * interval, "beside": solid.beside},
         }
 
     def force(self) -> list[float]:

@@ -10,6 +10,7 @@ from markupsafe import Markup
 
 from crosscheck2d.adapters.advance import off_grid_note
 from crosscheck2d.adapters.engines import OWN
+from crosscheck2d.reports.compare.fast_disks import fast_note
 from crosscheck2d.reports.compare.metrics import METRICS
 from crosscheck2d.reports.compare.verdicts import VERDICTS
 from crosscheck2d.reports.page import replay, style
@@ -167,6 +168,8 @@ def remarks(scene: SceneScores) -> list[Part]:
         sentences.append(f"The exact answer ends at {end} s: {truth.reason}.")
     if note := off_grid_note(scenario):
         sentences.append(f"{note[0].upper()}{note[1:].removesuffix('.')}.")
+    if note := fast_note(scene.comparison):
+        sentences.append(note)
     by_reason: dict[str, list[str]] = {}
     for name, reason in scene.refused.items():
         by_reason.setdefault(reason, []).append(long_label(name))

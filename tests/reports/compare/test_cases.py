@@ -10,7 +10,9 @@ import pytest
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.compare import laws, scales
+from crosscheck2d.reports.compare.comparison import Comparison
 from crosscheck2d.reports.compare.delays import jumps_of
+from crosscheck2d.reports.compare.fast_disks import fast_note
 from crosscheck2d.reports.compare.metrics import METRICS
 from crosscheck2d.reports.compare.restitution import Restitutions
 from crosscheck2d.reports.compare.view import NOT_JUDGED, Value, View, beside
@@ -246,6 +248,15 @@ def test_the_energy_at_hand_is_what_a_disk_can_lose():
     assert scales.energy(spun) == pytest.approx(4.5 + 0.03125 * 8.0**2 / 2)
     lies = replace(ball, scene=replace(ball.scene, position=np.array([[0.0, 0.25]])))
     assert scales.energy(lies) == pytest.approx(9.81 * 0.25)
+
+
+def test_a_floor_along_which_a_disk_rolls_is_no_wall_that_it_can_pass():
+    for velocity, passes in (([30.0, 0.0], False), ([0.0, -30.0], True)):
+        scene = one_disk([0, 2], velocity, radius=[1], walls=[[[-90, 1], [90, 1]]])
+        fast = Scenario("fast", "?", "here", scene, 1.0, 0.1, (1, 2), without_truth="not needed")
+        table = Comparison(fast, None, (), None)  # type: ignore[arg-type]
+
+        assert bool(fast_note(table)) is passes
 
 
 def test_a_collision_found_forty_steps_late_is_counted_in_the_note():

@@ -43,7 +43,6 @@ from crosscheck2d.scenarios.files.scene_file import read_scene_file, scene_text
 from crosscheck2d.scenarios.model import Array, Scene, State
 from crosscheck2d.scenarios.no_truth import NoTruth
 from crosscheck2d.scenarios.truth.closed_forms import world_thrusts
-from crosscheck2d.scenarios.truth.exact import with_oracle
 
 EVENTS = [  # frame, key, down: a turn, a thrust across it, a renewed thrust, both keys of a pair
     (8, "a", True),
@@ -193,6 +192,17 @@ def steered_home() -> list[tuple[int, str, bool]]:
     return events
 
 
+def test_a_scripted_flight_wins():
+    events = steered_home()
+    flight = flown(["reference:exercise"], events[-1][0] - 200, events[:-1], asteroids=0)
+    on_the_way = flight.won
+    flight.advance(200)
+    flight.key("s", False)
+
+    assert not on_the_way
+    assert flight.won
+
+
 def test_winning_is_the_exercises_rule_as_written():
     # A squared distance below 0.5, so from 0.707 m on; spin may be as negative as it likes.
     flight = Flight(field_scenario(asteroids=0), ["reference:exercise"])
@@ -214,20 +224,61 @@ def test_winning_is_the_exercises_rule_as_written():
 
 def test_a_ship_that_leaves_is_set_back_to_its_start():
     # Backwards: 1.5 m at 0.25 m/s2 take sqrt(12) s = 222 frames.
-    flight = flown(["reference:exercise", "box2d:matched"], 220, [(0, "s", True)], asteroids=0)
-    while flight.left_at < 0 and flight.frame < 230:
-        flight.advance()
-    ships = [flyer.state.position[SHIP].tolist() for flyer in flight.flyers]
-    speeds = [flyer.state.velocity[SHIP].tolist() for flyer in flight.flyers]
-    ends = flight.left_at * FRAME
-    flight.advance(10)
+    flight = flown(
+        ["reference:exercise", "box2d:matched"],
+        240,
+        [(0, "s", True), (225, "s", False)],
+        asteroids=0,
+    )
 
-    assert ships == [pytest.approx(START, abs=1e-6)] * 2
-    assert speeds == [[0.0, 0.0]] * 2
     assert [len(flyer.edges) for flyer in flight.flyers] == [1, 1]
     assert 220 <= flight.left_at <= 223
-    assert flight.saved().duration == ends
-    assert not flight.saved().thrusts[-1].stop > ends
+    assert flight.solid.state.position[SHIP, 0] == pytest.approx(START[0], abs=0.05)
+    assert flight.saved().duration == flight.left_at * FRAME
+    assert not flight.saved().thrusts[-1].stop > flight.left_at * FRAME
+
+
+@pytest.mark.parametrize("name", ["reference:exercise", "pymunk:matched"])
+def test_a_ship_is_set_back_in_the_step_in_which_it_leaves(name: str):
+    flight = flown([name], 222, [(0, "s", True)], asteroids=0)
+    while flight.left_at < 0:
+        flight.advance()
+    # After k steps, velocity first, it is a dt2 k (k + 1) / 2 behind, position first a dt2 k (k -
+    # 1) / 2.
+    a, first = 0.25 * flight.dt**2 / 2, 1 if ENGINES[name].alpha == 1.0 else -1
+    behind = a * np.arange(6000) * (np.arange(6000) + first)
+    leaves = int(np.argmax(START[0] - behind < -5.0))
+    since = flight.frame * flight.substeps - leaves
+    state = flight.solid.state
+
+    assert 0 < since < flight.substeps
+    assert state.position[SHIP] == pytest.approx([START[0] - behind[since], START[1]], abs=1e-13)
+    assert state.velocity[SHIP] == pytest.approx([-0.25 * since * flight.dt, 0.0], abs=1e-13)
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ["reference:exercise", "box2d:matched"],
+        pytest.param(ENGINES, marks=pytest.mark.long),
+    ],
+    ids=["two", "all"],
+)
+def test_looking_at_every_step_near_an_edge_changes_no_bit(names: Iterable[str]):
+    # The ship turns round 0.1 m before the edge, where it is looked at step by step; `play` looks
+    # once a frame.
+    keys = [(0, "s", True), (150, "s", False), (151, "w", True)]
+    names = with_edges(names)
+    flight = flown(names, 400, keys, seed=4, asteroids=8)
+    scenario = flight.saved()
+    ends = [play(ENGINES[name].make(), name, scenario, flight.dt).trajectory for name in names]
+    nearest = min(float(end.position[:, SHIP, 0].min()) for end in ends if end is not None)
+
+    assert flight.left_at < 0
+    assert -5.0 < nearest < -4.7
+    for end, state in zip(ends, bits(flight)):
+        assert end is not None
+        assert {name: array.tobytes() for name, array in vars(end.at(-1)).items()} == state
 
 
 def test_the_marker_names_the_first_collision():
@@ -236,7 +287,7 @@ def test_the_marker_names_the_first_collision():
     flight = flown(["reference:exercise", "pymunk:shipped", "pymunk:matched"], 64, [])
     scenario = flight.saved()
     ghost, matched = flight.flyers[1:]
-    truth = with_oracle(scenario).truth(scenario.times)  # type: ignore[misc]
+    truth = read_truth(scenario)
     t, i, j = truth.collisions.t[0], truth.collisions.i[0], truth.collisions.j[0]
 
     assert ghost.divergence is not None
@@ -245,6 +296,12 @@ def test_the_marker_names_the_first_collision():
     assert 0 <= ghost.divergence.at.t - t <= flight.dt
     assert ghost.divergence.only == ""
     assert matched.divergence is None or matched.divergence.at.frame > ghost.divergence.at.frame
+
+
+def read_truth(scenario):  # type: ignore[no-untyped-def]
+    from crosscheck2d.scenarios.truth.exact import with_oracle
+
+    return with_oracle(scenario).truth(scenario.times)
 
 
 class Failing:
@@ -270,7 +327,7 @@ def test_an_engine_that_fails_leaves_and_the_others_fly_on(monkeypatch: pytest.M
     flight.advance(10)
 
     assert flight.flyers[0].left == "out of fuel"
-    assert flight.solid.name == "reference:exercise"
+    assert (flight.solid.name, flight.solid_since) == ("reference:exercise", 3 * FRAME)
     assert flight.frame == 10
 
 
@@ -460,7 +517,7 @@ def test_a_ship_whose_start_is_taken_is_set_back_beside_it(name: str):
     flyer = flight.solid
     ship, rock = flyer.state.position
 
-    assert (flyer.left, len(flyer.edges)) == ("", 1)
+    assert (flyer.left, len(flyer.edges), flyer.beside) == ("", 1, True)
     assert np.hypot(*(ship - rock)) >= scene.radius.sum()
     assert np.hypot(*(ship - START)) < 2 * scene.radius.sum()
 

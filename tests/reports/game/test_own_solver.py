@@ -3,6 +3,7 @@ flight leaves the others."""
 
 from __future__ import annotations
 
+import re
 import signal
 import subprocess
 from collections import Counter
@@ -100,6 +101,7 @@ def test_a_solver_that_dies_in_flight_leaves_and_the_others_fly_on(
         row = page.locator("tr[data-engine$=':own'] [data-cell=diverged]").inner_text()
         solid, frame = page.evaluate("[game.field.engines[game.now.solid], game.now.frame]")
         chosen = page.locator("[name=solid]:checked").get_attribute("value")
+        then = page.locator("tr.solid [data-cell=diverged]").inner_text()
         page.wait_for_function("() => game.sky.last[3].length")
         [mark] = page.evaluate("game.sky.last[3].map((mark) => mark.text)")
         page.evaluate("game.field.seen = true")
@@ -108,6 +110,7 @@ def test_a_solver_that_dies_in_flight_leaves_and_the_others_fly_on(
         again = page.locator("[name=solid]:checked").get_attribute("value")
 
     assert (chosen, again) == ("reference:exercise", f"{path}:own")
+    assert re.fullmatch(r"solid since 0\.\d\d s, when Exercise.js left", then)
     assert mark == "Exercise.js left"
     assert banner.endswith("; reference:exercise is solid from here on")
     assert frame == 30

@@ -231,8 +231,10 @@ def test_the_stability_page_and_the_report_point_at_each_other_where_they_are_ma
         Path("reports/out/latest/report.html"),
         Path("reports/out/stability/stability.html"),
     )
-    parameter = inspect.signature(cli.stability).parameters["out"].default
-    assert (cli.DEFAULT_OUT, parameter) == (report.parent, limits.parent)
+    defaults = [
+        inspect.signature(run).parameters["out"].default for run in (cli.run, cli.stability)
+    ]
+    assert defaults == [report.parent, limits.parent]
     assert PAGES["report"].href == "latest/report.html"
     assert PAGES["stability"].href == "stability/stability.html"
     assert not (results.parent / "latest").exists()
