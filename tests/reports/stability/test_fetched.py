@@ -52,8 +52,11 @@ FAST = ("tunnelling_head_on", "slow_collision", "far_from_origin")
 
 
 def marks_of(row: Kept) -> list[pytest.MarkDecorator]:
-    """Rapier alone takes two minutes."""
-    in_the_gate = row.case == "slow_collision" and "rapier2d" not in row.engine
+    """Rapier alone takes two minutes, planck:shipped ten seconds a case."""
+    in_the_gate = row.case == "slow_collision" and row.engine in (
+        "planck:matched",
+        "matter:matched",
+    )
     return [] if in_the_gate else [pytest.mark.long]
 
 
